@@ -125,7 +125,7 @@ class GraphEnvironment(gymnasium.Env[Array, Array]):
         return self._run
 
     def _checked(self, action: Array) -> Array:
-        """The graph's action, (n,), of one in ``action_space``."""
+        """Return the graph's action, (n,), of one in ``action_space``."""
         space, given = self.action_space, np.asarray(action, np.float64)
         assert isinstance(space, gymnasium.spaces.Box)
         if given.shape != space.shape:
@@ -169,7 +169,7 @@ def make(
     normalised: bool = False,
     ticks: int = 1,
 ) -> GraphEnvironment:
-    """An environment of a graph. Many may live in one process.
+    """Make an environment of a graph. Many may live in one process.
 
     Args:
         graph: a graph, or whatever ``aloft.load`` takes.

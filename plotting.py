@@ -1,4 +1,4 @@
-"""What all of aloft's pictures share: one look, panels of lines over time, and files of them.
+"""Common parts of all pictures: one look, panels of lines over time, and files of them.
 
 matplotlib draws everything. It is imported inside the functions, because most commands draw
 nothing. The same data give the same bytes: the fonts are matplotlib's own, and neither dates nor
@@ -42,7 +42,7 @@ DARK = {
     "#f4f1e6": "#2a2820", "#fdeadb": "#35261b", "#e3edf7": "#1c2b3b", "#e7f4e8": "#1b2d20",
     "#f3f3f3": "#252a30", "#f6c89f": "#5c4028", "#0072b2": "#4ea8dd", "#6d4c41": "#b08b7d",
 }  # fmt: skip
-"""What light colours, and lines that are too dark, become in an SVG file on a dark screen."""
+"""Colours of a dark screen in an SVG file for light colours, and for lines that are too dark."""
 DPI = 150
 """Pixels per inch of pictures that are not vector graphics."""
 LABEL_SIZE = 7.5
@@ -92,7 +92,7 @@ def style() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float, title: str = "") -> Figure:
-    """An empty figure of this size [inch], with its title at the top left.
+    """Make an empty figure of this size [inch], with its title at the top left.
 
     The figure belongs to no window, so no display is needed.
     """
@@ -105,7 +105,8 @@ def new_figure(width: float, height: float, title: str = "") -> Figure:
 
 
 def svg_text(figure: Figure) -> str:
-    """The figure as the text of an SVG file, light in print and dark where its reader's screen is.
+    """Write the figure as the text of an SVG file, light in print and dark where its reader's
+    screen is.
 
     The same figure always gives the same text.
     """
@@ -125,7 +126,7 @@ def svg_text(figure: Figure) -> str:
 
 
 def image(figure: Figure) -> Image:
-    """The figure as a picture of ``DPI`` pixels per inch."""
+    """Draw the figure as a picture of ``DPI`` pixels per inch."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
@@ -136,7 +137,7 @@ def image(figure: Figure) -> Image:
 
 
 def look(number: int) -> dict[str, Any]:
-    """The colour and the dash pattern of the line with that number, counted from zero."""
+    """Return the colour and the dash pattern of the line with that number, counted from zero."""
     rounds = number // len(COLOURS)
     return {
         "color": COLOURS[number % len(COLOURS)],
@@ -222,7 +223,7 @@ def draw_panels(panels: Sequence[tuple[Axes, Panel]]) -> None:
 
 
 def panels_figure(panels: Sequence[Panel], title: str) -> Figure:
-    """Panels one below the other, each as wide as a page."""
+    """Draw panels one below the other, each as wide as a page."""
     figure = new_figure(9.0, 0.6 + 2.4 * len(panels), title)
     axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
     draw_panels(list(zip(axes, panels, strict=True)))
@@ -230,7 +231,7 @@ def panels_figure(panels: Sequence[Panel], title: str) -> Figure:
 
 
 def panels_svg(panels: Sequence[Panel], title: str) -> str:
-    """Panels one below the other, as the text of an SVG file."""
+    """Draw panels one below the other, as the text of an SVG file."""
     with style():
         return svg_text(panels_figure(panels, title))
 
@@ -285,7 +286,8 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
 
 
 def _numbers(lines: Sequence[Curve]) -> list[int]:
-    """Which colour each line takes: limits and lines with a colour of their own take none."""
+    """Return the index of each line's colour: limits and lines with a colour of their own take
+    none."""
     numbers, used = [], 0
     for line in lines:
         numbers.append(used)
@@ -298,7 +300,7 @@ def _colour(line: Curve, number: int) -> str:
 
 
 def _last(line: Curve, x_range: tuple[float, float]) -> float:
-    """The last finite value that a line has within the range; NaN where it has none."""
+    """Return the last finite value that a line has within the range; NaN where it has none."""
     shown = np.isfinite(line.y) & (line.x >= x_range[0]) & (line.x <= x_range[1])
     return float(line.y[shown][-1]) if shown.any() else float("nan")
 
@@ -320,7 +322,7 @@ def label_ends(axes: Axes, labels: Sequence[tuple[str, float, str]]) -> None:
 
 
 def spread(wanted: Sequence[float], gap: float) -> list[float]:
-    """Places near the wanted ones, in the same order, between 0 and 1 and ``gap`` apart.
+    """Spread places near the wanted ones, in the same order, between 0 and 1 and ``gap`` apart.
 
     Where there is no room for all between 0 and 1, the lowest ones go below 0.
     """

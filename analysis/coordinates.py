@@ -113,7 +113,7 @@ class Coordinates:
 
 
 def _product(a: Array, b: Array) -> Array:
-    """Hamilton's product of two quaternions x, y, z, w."""
+    """Return Hamilton's product of two quaternions x, y, z, w."""
     out = np.empty(4)
     multiply(a, b, out)
     return out

@@ -20,7 +20,7 @@ from ..mathematics.arrays import Array
 from ..mathematics.capture_step import support_margin
 from ..mathematics.constants import GRAVITY
 from ..mathematics.rotations import matrices_of_quaternions
-from ..runtime.language.fault import Fault, FaultParameters
+from ..runtime.language.signal_error import SignalError, SignalErrorParameters
 from .robot_run import RobotRun
 
 Kind = Literal[
@@ -106,7 +106,7 @@ class Measure:
 
 
 def stretches(beyond: np.ndarray, gap: int = 0) -> Iterator[tuple[int, int]]:
-    """First and last index of every stretch of true values (n,); gaps of up to ``gap`` are none."""
+    """Yield the first and last index of every stretch of true values (n,); gaps of up to ``gap`` are none."""
     found = np.flatnonzero(beyond)
     if not len(found):
         return
@@ -150,7 +150,7 @@ def mean(values: Array, size: int) -> Array:
 
 
 def length(vectors: Array) -> Array:
-    """Euclidean norms of (n, k) vectors."""
+    """Return the Euclidean norms of (n, k) vectors."""
     norms: Array = np.linalg.norm(vectors, axis=-1)
     return norms
 
@@ -158,7 +158,9 @@ def length(vectors: Array) -> Array:
 def _faults(run: RobotRun) -> Iterator[Measure]:
     """Yield the faults that the graph declares."""
     for spec in run.run.graph.blocks:
-        if issubclass(spec.block_type, Fault) and isinstance(spec.params, FaultParameters):
+        if issubclass(spec.block_type, SignalError) and isinstance(
+            spec.params, SignalErrorParameters
+        ):
             active = run(f"{spec.path}.state", "active").astype(float)
             name = f"{spec.block_type.target} is {spec.params.kind} ({spec.path})"
             yield Measure("fault", name, active, 0.5, "")
@@ -220,7 +222,7 @@ def planned_ground(run: RobotRun) -> Array:
 
 
 def _sensors(run: RobotRun) -> Iterator[Measure]:
-    """Measurements that differ from the truth."""
+    """Yield the measurements that differ from the truth."""
     truth, robot = run.truth, run.robot
     joints, imu = run.sensor(JointState), run.sensor(ImuReading)
     if joints:
@@ -262,7 +264,7 @@ def _sensors(run: RobotRun) -> Iterator[Measure]:
 
 
 def _actuators(run: RobotRun) -> Iterator[Measure]:
-    """Motors that do not do what they are commanded, by their measured current and by the truth."""
+    """Yield the motors that do not do what they are commanded, by their measured current and by the truth."""
     truth, robot, joints = run.truth, run.robot, run.port(JointState)
     if not (run.command and joints):
         return
@@ -284,7 +286,7 @@ def _actuators(run: RobotRun) -> Iterator[Measure]:
 
 
 def _estimates(run: RobotRun) -> Iterator[Measure]:
-    """Estimates that differ from the truth."""
+    """Yield the estimates that differ from the truth."""
     truth, base = run.truth, run.base
     if run.delay:
         measured, used = run(run.delay, "measured"), run(run.delay, "delay")
@@ -331,7 +333,9 @@ def _estimates(run: RobotRun) -> Iterator[Measure]:
 
 
 def _limits(run: RobotRun) -> Iterator[Measure]:
-    """Motors and joints at their limits, programs without a solution, what was warned of, and the safety stop."""
+    """Yield the motors and joints at their limits, programs without a solution, what was warned of, and the safety
+    stop.
+    """
     truth, robot = run.truth, run.robot
     torque, speed, motors = run(truth, "motor_torque"), run(truth, "motor_speed"), robot.motors
     slope = motors.peak_torque / (motors.no_load_speed - motors.corner_speed)
@@ -380,7 +384,7 @@ def _plan(run: RobotRun) -> Iterator[Measure]:
 
 
 def _hanging_feet(run: RobotRun) -> Iterator[Measure]:
-    """Feet in the air beside one that stands after touchdown, which do not go down to the ground."""
+    """Yield the feet in the air beside one that stands after touchdown, which do not go down to the ground."""
     point, ground = run(run.truth, "contact_position")[:, :, 2], run(run.truth, "ground_height")
     of, robot = np.array(run.robot.foot_of_contact()), run.robot
     landing = np.isin(run.phase, (Phase.LANDING, Phase.RECOVER))

@@ -28,7 +28,7 @@ from ..logs.file.header import recorded_signals
 from ..mathematics.arrays import Array
 from ..runtime.graph import Graph, load
 from ..runtime.language.errors import AloftError
-from ..runtime.language.fault import FOLDER, chirp_lines
+from ..runtime.language.signal_error import FOLDER, chirp_lines
 from ..runtime.language.stages import CheckedGraph
 from ..runtime.running.memory import BoundGraph
 from .coordinates import signal_coordinates

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..logs.file.header import recorded_signals
 from ..runtime.language.errors import AloftError
-from ..runtime.language.fault import CONDITION
+from ..runtime.language.signal_error import CONDITION
 from ..runtime.loading.reading.selection import Selection, select
 from ..runtime.running.memory import BoundGraph
 from ..runtime.running.stepping import SteppedRun

@@ -550,5 +550,5 @@ def _groups(names: Sequence[str]) -> dict[str, list[int]]:
 
 
 def _control_names(names: Sequence[str]) -> list[str]:
-    """Names as python-control takes them: without dots."""
+    """Return the names as python-control takes them: without dots."""
     return [name.replace(".", "/") for name in names]

@@ -250,7 +250,7 @@ def margins_figure(
 def _draw_measured(
     points: FrequencyResponse, loop: Any, hertz: Array, gain: Axes, phase: Axes, colour: str
 ) -> None:
-    """Points with bars, each phase on the turn of the model's curve."""
+    """Draw points with bars, each phase on the turn of the model's curve."""
     sure = points.radius < np.abs(points.value)
     size, share = np.abs(points.value), np.where(sure, points.radius / np.abs(points.value), 0.0)
     bars = 20.0 * np.log10(np.array([1.0 / (1.0 - share), 1.0 + share]))

@@ -31,7 +31,7 @@ from ..logs.replay.replay import Replayable
 from ..mathematics.arrays import Array
 from ..robots.description import RobotDescription
 from ..runtime.language.errors import AloftError
-from ..runtime.language.fault import Fault
+from ..runtime.language.signal_error import SignalError
 from ..runtime.language.signals import Signal
 from ..runtime.language.stages import BlockSpec
 
@@ -152,7 +152,7 @@ class RobotRun:
         """Source of the controller's command, before any fault on the way to the robot; else empty."""
         source = self.read_by(self.robot_block, JointCommand)
         while source and issubclass(
-            self.run.graph.block(source.rpartition(".")[0]).block_type, Fault
+            self.run.graph.block(source.rpartition(".")[0]).block_type, SignalError
         ):
             source = self.run.graph.block(source.rpartition(".")[0]).wires["u"].source
         return source

@@ -395,7 +395,7 @@ class _Search:
         return np.concatenate(found)
 
     def jacobian(self, unknowns: Array) -> Array:
-        """Central differences."""
+        """Compute the Jacobian by central differences."""
         columns = []
         for k, value in enumerate(unknowns):
             step = np.zeros(len(unknowns))

@@ -269,7 +269,7 @@ CLARABEL_TOLERANCE = 1e-12
 """
 NO_PLACES = np.zeros(0, np.int64)
 STATES = 5_000
-"""The states of recorded jumps that are wanted at least."""
+"""Least number of states of recorded jumps."""
 
 
 def agreement(count: int = 50_000, seed: int = 1, states: int = STATES) -> list[Row]:
@@ -506,7 +506,7 @@ class Methods:
 
 
 def _by_daqp(program: FullMatrices) -> tuple[Array | None, Flags]:
-    """DAQP's solution, and the inequalities that it says are active."""
+    """Solve with DAQP and return the solution, and the inequalities that it says are active."""
     import daqp
 
     cost, equality, inequality = program.cost, program.equality, program.inequality

@@ -20,16 +20,16 @@ from .rows import Row
 SEEDS = range(34000, 34020)
 """Seeds of the robots and targets; nothing is tuned on them."""
 PLACE_GOAL, TURN_GOAL = 0.03, 5.0
-"""m, deg"""
+"""Largest error of place [m] and heading [deg] of a success."""
 MISSED_GOAL = 0.05
 LIFT_OFF = 1.39
-"""s; when the first jump of ``graphs/steer.yaml`` leaves the ground."""
+"""Lift-off of the first jump of ``graphs/steer.yaml`` [s]."""
 BEFORE = (0.12, 0.44)
-"""s before it"""
+"""Times of a change before lift-off [s]."""
 FLYING = (0.02, 0.14)
-"""s after it"""
+"""Times of a change after lift-off [s]."""
 DEPTH = 0.1
-"""m; by how much the floor is below the lower of the two levels."""
+"""Depth of the floor below the lower of the two levels [m]."""
 
 Command = dict[str, Any]
 
@@ -42,7 +42,7 @@ def _target(rng: np.random.Generator) -> Command:
 
 
 def _beside(rng: np.random.Generator, target: Command, most: float, turn: float) -> Command:
-    """Another target at most so far from one [m, deg], in a drawn direction."""
+    """Draw another target at most so far from one [m, deg], in a drawn direction."""
     way, angle = rng.uniform(0.0, most), rng.uniform(0.0, 2.0 * math.pi)
     turned = math.radians(rng.uniform(-turn, turn))
     return {
@@ -82,7 +82,8 @@ def flight_changes(rng: np.random.Generator) -> list[Command]:
 
 
 def several_changes(rng: np.random.Generator) -> list[Command]:
-    """Place and heading change twice before lift-off, by up to 6 cm and 15 degrees each, and by up to 3 cm and 8 degrees in flight."""
+    """Draw two changes of place and heading before lift-off, by up to 6 cm and 15 degrees each, and
+    one by up to 3 cm and 8 degrees in flight."""
     first = _target(rng)
     second, third = _beside(rng, first, 0.06, 15.0), _beside(rng, first, 0.06, 15.0)
     return [
@@ -100,7 +101,7 @@ KINDS: Mapping[str, Callable[[np.random.Generator], list[Command]]] = {
 
 
 def changed_targets(seeds: Sequence[int] = SEEDS, kinds: Sequence[str] = tuple(KINDS)) -> list[Row]:
-    """Rows for each kind of change: the share of jumps that miss, and the errors."""
+    """Measure for each kind of change the share of jumps that miss, and the errors."""
     rows = []
     for kind in kinds:
         found = [run_changed(kind, seed) for seed in seeds]

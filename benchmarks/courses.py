@@ -32,9 +32,9 @@ MISSED_GOAL = 0.05
 OTHERS_MISSED_GOAL = 0.1
 """The same for other robots."""
 PLACE_GOAL = 0.03
-"""m"""
+"""Goal of the median of the courses' largest errors of place [m]."""
 LONGEST = 40.0
-"""s of the graph's time"""
+"""Longest duration of a course in the graph's time [s]."""
 
 
 def course(seed: int, jumps: int = JUMPS) -> list[dict[str, float]]:
@@ -55,7 +55,8 @@ def course(seed: int, jumps: int = JUMPS) -> list[dict[str, float]]:
 
 
 def courses(seeds: Sequence[int] = SEEDS, robot: str = "bruce") -> list[Row]:
-    """Rows: the shares of courses with a fall and off their places, errors of place, times of planning.
+    """Measure the shares of courses with a fall and off their places, errors of place, times of
+    planning.
 
     Args:
         seeds: of courses and trials.
@@ -94,7 +95,7 @@ def _rows(found: Sequence[Mapping[str, Any]], missed_goal: float) -> list[Row]:
 
 
 def pushed_courses(seeds: Sequence[int] = PUSHED_SEEDS) -> list[Row]:
-    """Rows of such courses with a push of 0.4 N s, in a drawn direction in a drawn flight."""
+    """Measure such courses with a push of 0.4 N s, in a drawn direction in a drawn flight."""
     found = [run_pushed(seed) for seed in seeds]
     n, fallen = len(found), [one for one in found if fell(one)]
     low, high = wilson_interval(len(fallen), n)

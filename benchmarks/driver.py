@@ -38,7 +38,7 @@ from ..robots.description import find_robot
 from .rows import Row, compare, other_process, take_turns
 
 GOAL = 300.0
-"""The most processor time that a good driver takes for a cycle [us]: at 1 kHz less than a third of a
+"""Largest processor time of a good driver's cycle [us]: at 1 kHz less than a third of a
 core, and with 0.5 ms on the wire within the period."""
 BARE = "bare write and read"
 RECORDED = 64
@@ -58,7 +58,7 @@ class Talk:
 
 
 class _RecordingBus(VirtualBusPort):
-    """The bus of a twin, which keeps what travels."""
+    """The bus of a twin, which keeps its traffic."""
 
     request = answer = b""
 
@@ -69,7 +69,7 @@ class _RecordingBus(VirtualBusPort):
 
 
 class _RecordingBoard(VirtualBoardPort):
-    """The port of a twin's board, which keeps what came last."""
+    """The port of a twin's board, which keeps the last packet."""
 
     packet = b""
 
@@ -112,7 +112,8 @@ def recorded() -> tuple[Driver, Talk]:
 
 @contextmanager
 def far_end(talk: Talk) -> Iterator[tuple[str, str]]:
-    """Another process answers as recorded; gives the paths of the bus's and the board's ports."""
+    """Start another process that answers as recorded; yield the paths of the bus's and the board's
+    ports."""
     with other_process("from aloft.benchmarks.driver import answer; answer()") as other:
         said = {"size": len(talk.request), "answers": [each.hex() for each in talk.answers],
                 "packets": [each.hex() for each in talk.packets]}  # fmt: skip

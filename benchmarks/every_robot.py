@@ -44,9 +44,9 @@ def _row(path: Path, name: str) -> Row:
     try:
         found = read(path)
     except RobotError as error:
-        fault = error.faults[0]
-        more = f" (and {len(error.faults) - 1} more)" if len(error.faults) > 1 else ""
-        return Row(name, None, "joints", note=f"refused: {fault.message}{more}")
+        description_error = error.errors[0]
+        more = f" (and {len(error.errors) - 1} more)" if len(error.errors) > 1 else ""
+        return Row(name, None, "joints", note=f"refused: {description_error.message}{more}")
     took = time.process_time() - start
     robot = found.description
     said = f"{robot.total_mass:.3g} kg, {len(robot.feet)} feet, read in {took:.1f} s"
@@ -64,7 +64,7 @@ def _import(path: Path) -> str:
         try:
             report(read(target))
         except RobotError as error:
-            return error.faults[0].message
+            return error.errors[0].message
     return ""
 
 

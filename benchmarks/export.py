@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..clib.check import input_rows, write_names
-from ..clib.library import Library
+from ..clib.library import SharedLibrary
 from ..clib.write import write_library
 from ..runtime.language.errors import AloftError
 from .rows import Row
@@ -35,11 +35,11 @@ RATES = (500, 1000, 5000)
 _PROGRAM = Path(__file__).with_name("export_ticks.c")
 
 
-class _Library:
+class _TimedLibrary:
     """The library on the recorded inputs, in the manner of ``RecordedController``."""
 
     def __init__(self, jump: RecordedJump, fused: RecordedController, description: Path) -> None:
-        self.library = Library(description)
+        self.library = SharedLibrary(description)
         layout = fused.bound.memory.bus.layout
         self.rows = input_rows(self.library.about, layout, jump.rows)
         self._signals = [
@@ -107,7 +107,7 @@ def export(
         cases[TSID] = _tsid_controller(jump, module)
     with tempfile.TemporaryDirectory(prefix="aloft-bench-") as folder:
         written = write_library(str(GRAPH), Path(folder) / "jumper")
-        cases[LIBRARY] = own = _Library(jump, fused, written.description)
+        cases[LIBRARY] = own = _TimedLibrary(jump, fused, written.description)
         names = list(cases)
         with _quiet():
             for _ in range(rounds + 1):
@@ -175,7 +175,7 @@ def _rows_in_c(
     return rows
 
 
-def _in_c(description: Path, own: _Library, count: int, seconds: float) -> dict[str, Any]:
+def _in_c(description: Path, own: _TimedLibrary, count: int, seconds: float) -> dict[str, Any]:
     """Run the program in C and return the figures that it prints."""
     folder, name = description.parent, own.library.about["name"]
     write_names(own.library.about, folder)

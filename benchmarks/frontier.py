@@ -18,7 +18,7 @@ SEEDS = tuple(range(9000, 9020))
 """Nothing is tuned on them."""
 FOLDER = Path("results") / "frontier"
 MOST_CPU, FIRST_LOOK_CPU = 90.0, 15.0
-"""s; after so much processor time no further solve is begun in a search along one direction; the
+"""Processor time after which a search along one direction begins no further solve [s]; the
 second with fewer runs a rung than ``FIRST_LOOK``."""
 
 
@@ -27,7 +27,7 @@ def frontier(
     folder: Path = FOLDER,
     directions: Sequence[Direction] = DIRECTIONS,
 ) -> list[Row]:
-    """One row a direction; writes ``frontier.json`` and ``frontier.svg`` into ``folder``."""
+    """Measure one row a direction; write ``frontier.json`` and ``frontier.svg`` into ``folder``."""
     cpu = MOST_CPU if len(seeds) >= FIRST_LOOK else FIRST_LOOK_CPU
     effort = Effort(len(seeds), cpu, cpu)
     told = find_frontier(bruce_jumps(), directions, seeds, folder, effort)

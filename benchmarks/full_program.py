@@ -66,7 +66,8 @@ class FullProgram:
         ]
 
     def _of_size(self, count: int, limit_rows: int) -> FullMatrices:
-        """Zero matrices for ``count`` points in stance and ``limit_rows`` rows of torque limits."""
+        """Return zero matrices for ``count`` points in stance and ``limit_rows`` rows of torque
+        limits."""
         size, cone_rows = self._n + 3 * count, PYRAMID_ROWS * count
         matrix, bound = np.zeros((cone_rows + limit_rows, size)), np.zeros(cone_rows + limit_rows)
         return FullMatrices(
@@ -120,7 +121,8 @@ class FullProgram:
 def joint_torque(
     terms: RigidBodyTerms, acceleration: Array, force: Array, active: Indices
 ) -> Array:
-    """tau = M_j a + h_j - sum J_j' f (paper, opt_torque), (n_joints,) [N m], for forces of ``active`` points."""
+    """Compute tau = M_j a + h_j - sum J_j' f (paper, opt_torque), (n_joints,) [N m], for forces of
+    ``active`` points."""
     torque: Array = terms.mass_matrix[6:] @ acceleration + terms.nonlinear[6:]
     for point, each in zip(active, force, strict=True):
         torque -= each @ terms.jacobian[point, :, 6:]

@@ -123,7 +123,7 @@ def general_blocks(rounds: int = 40) -> list[Row]:
 
 
 def _library(folder: Path) -> Path | None:
-    """``C_SOURCE`` as a library; none where there is no C compiler."""
+    """Compile ``C_SOURCE`` to a library; none where there is no C compiler."""
     compiler = next(
         (c for c in (os.environ.get("CC", "cc"), "gcc", "clang") if shutil.which(c)), None
     )
@@ -137,7 +137,7 @@ def _library(folder: Path) -> Path | None:
 
 
 def _first_compile(name: str) -> Row:
-    """Processor time in which a new process starts the chain, with an empty cache."""
+    """Measure the processor time in which a new process starts the chain, with an empty cache."""
     with tempfile.TemporaryDirectory() as cache:
         done = subprocess.run(
             [sys.executable, "-c", COMPILE, name], check=True, capture_output=True, text=True,

@@ -19,12 +19,12 @@ SEEDS = range(34100, 34120)
 """Seeds of the robots and speeds; nothing is tuned on them."""
 HOPS = 30
 HOP_TIME = 0.512
-"""s"""
+"""Time from hop to hop [s]."""
 MISSED_GOAL = 0.05
 FASTEST = 0.4
-"""m/s"""
+"""Largest speed of a command [m/s]."""
 LASTS = (3, 6)
-"""hops"""
+"""Least and largest number of hops at one speed."""
 
 
 def speeds(seed: int, fastest: float = FASTEST) -> list[dict[str, float]]:
@@ -39,7 +39,8 @@ def speeds(seed: int, fastest: float = FASTEST) -> list[dict[str, float]]:
 
 
 def hopping_on(seeds: Sequence[int] = SEEDS) -> list[Row]:
-    """Rows: the shares of rows with a fall and of those that fail a criterion, and the error of the speed."""
+    """Measure the shares of rows with a fall and of those that fail a criterion, and the error of
+    the speed."""
     found = [run_hops(seed, speeds(seed)) for seed in seeds]
     n, fallen = len(found), [one for one in found if fell(one)]
     low, high = wilson_interval(len(fallen), n)

@@ -79,7 +79,7 @@ def scaled(factor: float) -> Callable[[random.Random, str], str]:
 
 
 def of_all(path: str, attributes: tuple[str, ...], factor: float) -> Change:
-    """All values of a kind are in another unit."""
+    """Return a change of all values of a kind to another unit."""
 
     def change(draw: random.Random, root: ET.Element) -> bool:
         for each in root.findall(path):
@@ -92,7 +92,7 @@ def of_all(path: str, attributes: tuple[str, ...], factor: float) -> Change:
 
 
 def misspelt(draw: random.Random, text: str) -> str:
-    """Two letters of a word are swapped."""
+    """Swap two letters of a word."""
     place = draw.randrange(max(1, len(text) - 1))
     return text[:place] + text[place + 1 : place + 2] + text[place : place + 1] + text[place + 2 :]
 

@@ -52,7 +52,7 @@ def _at(data: Any, path: tuple[Any, ...]) -> Iterator[Holder]:
 
 
 def _one(*path: Any, new: Callable[[random.Random, Any], Any]) -> Change:
-    """One of the values at a path is another one."""
+    """Return a change of one of the values at a path."""
 
     def change(draw: random.Random, data: Data) -> bool:
         places = [(holder, key) for holder, key in _at(data, path) if holder[key] is not None]
@@ -67,7 +67,7 @@ def _one(*path: Any, new: Callable[[random.Random, Any], Any]) -> Change:
 
 
 def _all(*path: Any, factor: float) -> Change:
-    """All values at a path are in another unit."""
+    """Return a change of all values at a path to another unit."""
 
     def change(_: random.Random, data: Data) -> bool:
         places = [*_at(data, path)]
@@ -85,7 +85,7 @@ def _scaled(value: Any, factor: float) -> Any:
 
 
 def _lose(*path: Any) -> Change:
-    """One of what stands at a path is lost."""
+    """Return a change that loses one of the values at a path."""
 
     def change(draw: random.Random, data: Data) -> bool:
         places = [*_at(data, path)]
@@ -127,7 +127,7 @@ def _swap_ends(draw: random.Random, data: Data) -> bool:
 
 
 def _word(draw: random.Random, value: Any) -> Any:
-    """One number is none."""
+    """Replace a number by a word."""
     if isinstance(value, list):
         k = draw.randrange(len(value))
         return [*value[:k], _word(draw, value[k]), *value[k + 1 :]]

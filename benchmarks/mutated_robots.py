@@ -46,7 +46,7 @@ FILES = (
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of files: the content of good ones by name, and what is made wrong in them."""
+    """A kind of files: the content of good ones by name, and the mistakes made in them."""
 
     files: Mapping[str, bytes]
     mistakes: Mapping[str, Change]
@@ -171,7 +171,7 @@ def _outcome(path: Path, data: bytes, usual: frozenset[str]) -> tuple[str, str]:
             beside.write_text(new_yaml(path, beside)[0], encoding="utf-8")
             report(read(beside))
     except RobotError as error:
-        return "reported", error.faults[0].message
+        return "reported", error.errors[0].message
     except Exception as error:  # noqa: BLE001  # this is what is looked for
         return "crash", f"{type(error).__name__}: {error}"
     more = sorted(_said_of(found) - usual)

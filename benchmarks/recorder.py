@@ -131,7 +131,7 @@ def _drain(sink: Recorder) -> None:
 
 
 def packing(graph: CheckedGraph) -> list[Row]:
-    """Size and time of the packed rows, beside what Arrow makes of the same columns."""
+    """Measure size and time of the packed rows, beside Arrow's of the same columns."""
     result = Executor(graph).run(PACKED_TICKS)
     result.raise_if_failed()
     assert result.log is not None
@@ -217,10 +217,11 @@ class _MemoryWatch:
                 self.found.append(int(status.read_text().split()[1]) * 4096)
 
     def close(self) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
     def growth(self) -> float | None:
-        """Mebibytes that the last quarter's median is above that of the second quarter."""
+        """Return the mebibytes by which the last quarter's median is above that of the second
+        quarter."""
         quarter = len(self.found) // 4
         if quarter < 2:
             return None

@@ -48,7 +48,7 @@ class Row:
 def take_turns(
     cases: Mapping[str, Callable[[int], object]], rounds: int, repetitions: int
 ) -> dict[str, NDArray[np.float64]]:
-    """Microseconds of one repetition, for every case and round.
+    """Measure the microseconds of one repetition, for every case and round.
 
     A case is called with the number of repetitions it is to do. In each round every case has its
     turn, in an order that shifts from round to round, so that whatever else the machine does hits

@@ -45,7 +45,7 @@ class Filter(Block):
         self._half_x = np.zeros(WIDTH)
 
     def step(self) -> None:
-        """One tick."""
+        """Make one tick."""
         y, x, half_x = self._y, self._x, self._half_x
         np.multiply(self._u, HALF, out=y)
         np.multiply(x, HALF, out=half_x)
@@ -57,7 +57,7 @@ class PlainFilter(Filter):
     """The same, looking its ports up as blocks are usually written."""
 
     def step(self) -> None:
-        """One tick."""
+        """Make one tick."""
         np.multiply(self.u.value, HALF, out=self.y.value)
         np.multiply(self.x.value, HALF, out=self._half_x)
         np.add(self.y.value, self._half_x, out=self.y.value)

@@ -30,7 +30,8 @@ KINDS = (
 
 
 def stones(seeds: Sequence[int] = SEEDS) -> list[Row]:
-    """Rows for each kind of stones: the share of courses that do not come to the last stone, and of those that fail a criterion."""
+    """Measure for each kind of stones the share of courses that do not come to the last stone, and
+    of those that fail a criterion."""
     rows = []
     for name, height, sensor in KINDS:
         found = [run_stones(seed, height, sensor) for seed in seeds]
@@ -54,16 +55,17 @@ STEPS = 6
 STAIRCASE = [
     {"x": round(0.2 * step, 3), "top": round(0.04 * step, 3)} for step in range(1, STEPS + 1)
 ]
-"""m"""
+"""Position ahead and height of each step [m]."""
 GO2_STAIRS_SEEDS = range(33600, 33620)
 """Seeds of Go2 on its staircase (``graphs/robots/go2_stairs.yaml``); nothing is tuned on them."""
 GO2_STEPS = 7
 STEP = (0.198, 0.4)
-"""m; 2 mm less than their distance, as stones do not touch."""
+"""Length and width of a step [m]; 2 mm less than their distance, as stones do not touch."""
 
 
 def staircase(seeds: Sequence[int] = STAIRS_SEEDS) -> list[Row]:
-    """Rows: the share of robots that do not come up a staircase, of those that fail a criterion, and how long it takes."""
+    """Measure the share of robots that do not come up a staircase, of those that fail a criterion,
+    and the time that it takes."""
     found = [run_staircase(seed) for seed in seeds]
     return _rows_of_stairs("staircase", found, STEPS, "4 cm")
 

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 __all__ = ["main", "make_app"]
 
 COLLECTED_AFTER = (400_000, 5, 5)
-"""How many objects are made before Python looks for garbage among them, and among older ones. By its
-own limits, which begin with 700, it would look a hundred times through classes and functions that a
-start makes and that all stay. A check of a jump makes 100 000."""
+"""Numbers of objects after which Python looks for garbage among new ones, and of such passes among
+older ones. By its own limits, which begin with 700, it would look a hundred times through classes
+and functions that a start makes and that all stay. A check of a jump makes 100 000."""
 
 
 def main() -> None:
@@ -31,7 +31,7 @@ def main() -> None:
 
 
 def make_app(verbs: Iterable[str] | None = None) -> typer.Typer:
-    """The command line with those verbs, or with all; the files of others are not imported."""
+    """Make the command line with those verbs, or with all; the files of others are not imported."""
     from .app import VERBS
     from .app import make_app as resolve_composite_wires
 

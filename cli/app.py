@@ -44,7 +44,7 @@ ONLY_READ = ("check", "graph", "graphs", "blocks")
 
 
 def make_app(verbs: Iterable[str] = VERBS) -> typer.Typer:
-    """The command line with those verbs; the files of others are not imported."""
+    """Make the command line with those verbs; the files of others are not imported."""
     app = typer.Typer(
         name="aloft",
         help="Run, check and look at graphs of blocks.",
@@ -65,7 +65,7 @@ def make_app(verbs: Iterable[str] = VERBS) -> typer.Typer:
 
 
 def asked_for(arguments: list[str]) -> tuple[str, ...]:
-    """The verb that a command line begins with, or all of them where it begins otherwise."""
+    """Return the verb that a command line begins with, or all of them where it begins otherwise."""
     return (arguments[0],) if arguments and arguments[0] in VERBS else VERBS
 
 

@@ -1,4 +1,4 @@
-"""``aloft bench``: how fast the runtime is, as ratios to peers in the same process."""
+"""``aloft bench``: the speed of the runtime, as ratios to peers in the same process."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ or, in a clone of the repository: pip install --editable ."""
 
 
 def find_catalogue() -> ModuleType:
-    """The module that names all benchmarks, which lie beside the package in its source.
+    """Import the module that names all benchmarks, which lie beside the package in its source.
 
     Raises:
         AloftError: aloft was installed from a wheel, which has no benchmarks.
@@ -38,7 +38,7 @@ def find_catalogue() -> ModuleType:
 
 
 def benchmark_names(incomplete: str) -> list[str]:
-    """The names of benchmarks that begin with a text; none where there are no benchmarks."""
+    """List the names of benchmarks that begin with a text; none where there are no benchmarks."""
     try:
         names = find_catalogue().BENCHMARKS
     except AloftError:
@@ -151,12 +151,12 @@ def bench(
 
 
 def _names(text: str) -> list[str] | None:
-    """The names between the semicolons of an option's text; they have commas of their own."""
+    """Split an option's text at its semicolons into names, which have commas of their own."""
     return [name.strip() for name in text.split(";")] if text else None
 
 
 def _number(option: str, text: str, unit: str, most: float, expected: str) -> float | None:
-    """The number in an option's text, from zero to ``most``; none where there is no text.
+    """Parse the number in an option's text, from zero to ``most``; none where there is no text.
 
     Raises:
         AloftError: the text says no such number.

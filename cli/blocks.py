@@ -1,4 +1,4 @@
-"""``aloft blocks``: which blocks there are, and the contract of one; also as a page of Markdown, docs/blocks.md."""
+"""``aloft blocks``: all blocks, and the contract of one; also as a page of Markdown, docs/blocks.md."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def blocks(
 
 
 def reference(name: str) -> BlockReference:
-    """The contract of one block. Raises ``UnknownBlockError`` with the names that are alike."""
+    """Return the contract of one block. Raises ``UnknownBlockError`` with the names that are alike."""
     from ..runtime.language.errors import UnknownBlockError
     from ..runtime.language.reference import block_reference
     from ..runtime.language.registry import find_block, nearest_names
@@ -55,7 +55,7 @@ def reference(name: str) -> BlockReference:
 
 
 def all_references(*, ours: bool = False) -> list[BlockReference]:
-    """The contracts of all blocks by name; ``ours`` leaves out those of installed packages."""
+    """Return the contracts of all blocks by name; ``ours`` leaves out those of installed packages."""
     from ..runtime.language.reference import block_reference
     from ..runtime.language.registry import PACKAGES, all_blocks
 
@@ -91,7 +91,7 @@ def print_contract(out: Console, block: BlockReference) -> None:
 
 
 def port_rows(ports: tuple[PortReference, ...]) -> list[tuple[str, str, str, str, str]]:
-    """A row for every port with its text, and one for every field of its signal."""
+    """Return a row for every port with its text, and one for every field of its signal."""
     rows = []
     for port in ports:
         text = f"{port.text} ({port.note})" if port.note else port.text
@@ -109,19 +109,19 @@ marked *live* can be changed while a graph runs: `aloft params set block.paramet
 
 
 def reference_page(blocks: Sequence[BlockReference]) -> str:
-    """The whole page: a list of all blocks, then a section for each."""
+    """Write the whole page: a list of all blocks, then a section for each."""
     listing = [f"- [`{b.name}`](#{anchor(b.name)}): {b.summary}" for b in blocks]
     sections = [section(block) for block in blocks]
     return "\n".join([HEAD, *listing, "", *sections]).rstrip() + "\n"
 
 
 def anchor(name: str) -> str:
-    """The anchor of a heading."""
+    """Return the anchor of a heading."""
     return name.lower().replace(".", "")
 
 
 def section(block: BlockReference) -> str:
-    """A block's heading, docstring and tables."""
+    """Write a block's heading, docstring and tables."""
     parts = [f"## {block.name}", "", f"*{block.machine}*", "", "```text", block.text, "```", ""]
     for title, ports in (
         ("Inputs", block.inputs),
@@ -141,7 +141,7 @@ def section(block: BlockReference) -> str:
 
 
 def port_table(ports: Sequence[PortReference]) -> list[str]:
-    """One row a port, its fields in the last column."""
+    """Write one row a port, its fields in the last column."""
     lines = ["| port | signal | what it is | fields |", "|---|---|---|---|"]
     for port in ports:
         text = f"{port.text} ({port.note})" if port.note else port.text
@@ -151,5 +151,5 @@ def port_table(ports: Sequence[PortReference]) -> list[str]:
 
 
 def row(cells: Sequence[str]) -> str:
-    """One row of a table, with what would end a cell escaped."""
+    """Write one row of a table, with what would end a cell escaped."""
     return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"

@@ -63,12 +63,12 @@ def branch(
 
 
 def verdict_of(done: Replayed) -> dict[str, Any]:
-    """How the branch ended, as plain data."""
+    """Return the branch's outcome as plain data."""
     return {"success": done.result.success, "reason": done.result.reason}
 
 
 def print_outcomes(out: Console, opened: OpenedRun, done: Replayed) -> None:
-    """How both runs ended, and the metrics that differ."""
+    """Print the outcomes of both runs, and the metrics that differ."""
     before = opened.file.outcome or {}
     metrics = before.get("metrics", {})
     rows = [("end", str(before.get("reason", "")), done.result.reason)]

@@ -1,4 +1,4 @@
-"""``aloft deploy``: what one machine needs to run its part of a graph, in a folder."""
+"""``aloft deploy``: a folder with everything that one machine needs to run its part of a graph."""
 
 from __future__ import annotations
 

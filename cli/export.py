@@ -39,7 +39,7 @@ def fmu(
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:
-    """A Functional Mock-up Unit (co-simulation) of a graph or of a sub-graph.
+    """Export a graph or a sub-graph as a Functional Mock-up Unit (co-simulation).
 
     What the sub-graph reads from outside becomes its inputs, what it declares as outputs its
     outputs. Of a whole graph the inputs are its blocks blocks.External and the sensors of its robot, and
@@ -99,7 +99,7 @@ def c(
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:
-    """A library of C of a graph or of a sub-graph: no Python, no allocation, the same bytes.
+    """Export a graph or a sub-graph as a library of C: no Python, no allocation, the same bytes.
 
     Of a whole graph the robot stays outside: what it reads are the outputs. --check runs every tick
     of a recording through the library, for other processors in an emulator or in Node. The exit code is
@@ -134,7 +134,7 @@ def c(
 
 
 def _verdict(found: Checked) -> str:
-    """The result of a check in one sentence."""
+    """Describe the result of a check in one sentence."""
     if found.difference:
         return f"the bytes differ from the recording: {found.difference}"
     seen = ", ".join(f"{name} in {count} ticks" for name, count in found.statuses.items())
@@ -146,7 +146,7 @@ def _verdict(found: Checked) -> str:
 
 
 def _parts(graph: str) -> tuple[str, str]:
-    """The graph's file or address, and the path of the part behind it."""
+    """Split the address into the graph's file and the path of the part behind it."""
     shipped = "aloft:" if graph.startswith("aloft:") else ""
     path, _, part = graph.removeprefix(shipped).partition(":")
     return f"{shipped}{path}", part

@@ -127,7 +127,7 @@ def show(
 
 
 def attempt_json(each: Attempt) -> dict[str, Any]:
-    """An attempt and its worst run as plain data."""
+    """Return an attempt and its worst run as plain data."""
     run = each.worst
     assert run.outcome is not None
     return {
@@ -139,7 +139,7 @@ def attempt_json(each: Attempt) -> dict[str, Any]:
 
 
 def search_json(study: Study, found: Search, random: bool) -> dict[str, Any]:
-    """The search as one JSON object."""
+    """Return the search as one JSON object."""
     section, worst = study.falsification, found.worst
     assert section is not None
     first = next((each.number for each in found.attempts if each.failed), None)

@@ -45,7 +45,7 @@ class FormOptions:
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """Which running graph is shown."""
+    """The options that choose the running graph."""
 
     live: Annotated[
         bool,
@@ -84,7 +84,7 @@ def graph(
     graph on several machines all parts, with --keys, --as and --local as for `aloft top`.
     """
     from ..runtime.loading import load, picture
-    from ..runtime.placement.placed import place, placement_json
+    from ..runtime.placement.placed import placement_json, split_over_machines
 
     shown = form.web or showing.live
     with errors_reported(form.as_json):
@@ -113,7 +113,7 @@ def graph(
         if form.svg or form.png:
             draw_files(checked, closed or (), form.svg, form.png, dark=form.dark)
     if form.as_json:
-        placement = placement_json(place(checked)) if checked.machines else {}
+        placement = placement_json(split_over_machines(checked)) if checked.machines else {}
         print_json({**picture.table_json(checked), **placement})
     elif form.mermaid:
         typer.echo(picture.mermaid(checked), nl=False)
@@ -233,9 +233,9 @@ def print_ages(out: Console, graph: CheckedGraph) -> None:
 
 def print_machines(out: Console, graph: CheckedGraph) -> None:
     """Print which machine runs which blocks, and one row for each link between them."""
-    from ..runtime.placement.placed import link_rows, machine_rows, place
+    from ..runtime.placement.placed import link_rows, machine_rows, split_over_machines
 
-    placed = place(graph)
+    placed = split_over_machines(graph)
     columns = ("machine", "endpoint", "runs", "sends", "receives")
     out.print(table("machines", columns, machine_rows(placed)))
     if placed.links:

@@ -1,4 +1,4 @@
-"""``aloft jump``: plans a jump that is asked for in words and runs it, in one line."""
+"""``aloft jump``: plans and runs a jump that its options describe, in one line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.learning import LearningOptions, PlannedGraph, Prepare, learn_jumps
+from .shared.learning import LearningOptions, Prepare, ReadyJump, learn_jumps
 from .shared.options import JsonBesideTables, Quiet, expand_option_groups
 from .shared.output import console, errors_reported, print_json, say
 from .shared.rehearsal import REHEARSE_HELP, rehearsal
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from ..runtime.graph import Graph
 
 ABOVE_A_STEP = 0.07
-"""How much higher than the step a jump onto it rises, if it is not said [m]."""
+"""Default height of a jump onto a step above that step [m]."""
 HELP = {
     "rise": "Apex of the centre of mass above standing: 12cm; by default what the graph's task says.",
     "forward": "How far ahead it lands: 20cm.",
@@ -54,7 +54,7 @@ FIELDS = {
 
 @dataclass(frozen=True)
 class JumpOptions:
-    """The jump that is asked for."""
+    """The requested jump."""
 
     rise: Annotated[str, typer.Option(help=HELP["rise"])] = ""
     forward: Annotated[str, typer.Option(help=HELP["forward"])] = ""
@@ -68,7 +68,7 @@ class JumpOptions:
 
 @dataclass(frozen=True)
 class PlanningOptions:
-    """What is done beside planning the jump."""
+    """The options of planning a jump."""
 
     nearest: Annotated[
         bool,
@@ -110,7 +110,7 @@ def jump(
                     "--seeds, --no-record and --rehearse"
                 )
             corrected_parameters(flatten(path, settings))  # refuses a graph without them
-            record = recording.place("jump")
+            record = recording.path_for("jump")
             assert record is not None
             rise = changes.get("rise") or usual_rise(path, own) or 0.0
             prepare = planner_of(path, own, running, planning.nearest, console(quiet=True))
@@ -135,7 +135,7 @@ def jump(
         if many:
             code = run_many(path, settings, many, out, as_json)
         else:
-            options = OneRunOptions(record=recording.place("jump"), as_json=as_json, times=False)
+            options = OneRunOptions(record=recording.path_for("jump"), as_json=as_json, times=False)
             code = run_once(loaded, options, out, also={"asked": changes, "plan": planned, **about})
     raise typer.Exit(code)
 
@@ -154,9 +154,10 @@ def stronger_motors(task: JumpTask, graph: Graph, out: Console) -> dict[str, Any
 def planner_of(
     path: Path, own: Sequence[str], running: TrialOptions, nearest: bool, out: Console
 ) -> Prepare:
-    """What plans a task and loads its graph, with the trial and settings of the command line."""
+    """Return a function that plans a task and loads its graph, with the trial and settings of the
+    command line."""
 
-    def prepare(changes: Mapping[str, float], further: Sequence[str]) -> PlannedGraph:
+    def prepare(changes: Mapping[str, float], further: Sequence[str]) -> ReadyJump:
         chosen = settings_for(changes, running)
         settings = [*own, *chosen, *further]
         loaded = load_jump(path, settings, None)
@@ -165,7 +166,7 @@ def planner_of(
         plan = library_of(loaded).find(task)
         if plan is None:
             raise AloftError(f"{task.name}: {planned['reason']}")
-        return PlannedGraph(loaded, plan)
+        return ReadyJump(loaded, plan)
 
     return prepare
 
@@ -173,8 +174,8 @@ def planner_of(
 def task_changes(
     lengths: dict[str, str], rise: str, turn: str, path: Path, own: Sequence[str] = ()
 ) -> dict[str, float]:
-    """What the command line says of the task, in SI units, by the task's parameters; ``own`` are settings
-    that name the graph's robot.
+    """Return the changes of the task by the command line, in SI units, by the task's parameters;
+    ``own`` are settings that name the graph's robot.
 
     Raises:
         AloftError: a quantity has no unit or a wrong one, is beyond what a task may ask for, or two
@@ -220,18 +221,18 @@ def check_limits(name: str, text: str, field: str, value: float, unit: str) -> N
 
 
 def usual_rise(path: Path, own: Sequence[str]) -> float | None:
-    """The rise that the graph's own task asks for [m]."""
+    """Return the rise that the graph's own task asks for [m]."""
     return task_of(load_jump(path, [*own], None)).rise
 
 
 def settings_for(asked: Mapping[str, float], running: TrialOptions) -> list[str]:
-    """The overrides of a graph for the task, the trial and what else is asked for."""
+    """Return the overrides of a graph for the task, the trial and the other options."""
     task = [f"plan.task.{key}={value!r}" for key, value in asked.items()]
     return [*trial_settings_of(running), *task, *(running.overrides or [])]
 
 
 def load_jump(path: Path, settings: list[str], seed: int | None) -> Graph:
-    """The graph, which has a block ``plan`` for a task, and its seed set.
+    """Load the graph, which has a block ``plan`` for a task, with its seed set.
 
     Raises:
         LoadError: the graph may not run.
@@ -251,7 +252,7 @@ def load_jump(path: Path, settings: list[str], seed: int | None) -> Graph:
 
 
 def task_of(graph: Graph) -> JumpTask:
-    """The task that a graph's plan is for."""
+    """Return the task that a graph's plan is for."""
     from ..blocks.jumping.jump_plan import JumpPlan, read_or_make_task
     from ..runtime.language.block import Clock, Context
 
@@ -273,7 +274,7 @@ def plan_of(task: JumpTask, graph: Graph, nearest: bool, out: Console) -> dict[s
 
 
 def library_of(graph: Graph) -> PlanLibrary:
-    """The library of a graph's plan."""
+    """Return the library of a graph's plan."""
     from ..blocks.jumping.jump_plan import JumpPlan, plan_library
 
     params, robot = graph.checked.block("plan").params, graph.checked.robot

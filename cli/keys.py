@@ -30,12 +30,12 @@ def keys(
 ) -> None:
     """Make the certificates and sessions of all machines of a graph: mutual TLS, least access."""
     from ..runtime.loading import load
-    from ..runtime.placement.placed import place
+    from ..runtime.placement.placed import split_over_machines
     from ..runtime.transports.keys import make_keys
     from ..runtime.transports.zenoh_session import keys_from
 
     with errors_reported(as_json):
-        placed = place(load(graph, overrides or []))
+        placed = split_over_machines(load(graph, overrides or []))
         observers = list(observer or [])
         made = make_keys(placed, output, observers, days=days, anew=anew)
     machines = [spec.name for spec in placed.machines]

@@ -38,7 +38,8 @@ def language_server() -> None:
 
 
 def problems_of(text: str, path: Path) -> tuple[Problem, ...]:
-    """What ``aloft check`` would report on the text if it were the file ``path``."""
+    """Return the problems that ``aloft check`` would report on the text if it were the file
+    ``path``."""
     from ..runtime.loading.load import load_text
 
     try:
@@ -54,14 +55,15 @@ def problems_of(text: str, path: Path) -> tuple[Problem, ...]:
 
 @dataclass(frozen=True)
 class Cursor:
-    """What is under the cursor in a text: the ``word``, and the keys that lead to it, outermost first."""
+    """The place of the cursor in a text: the ``word`` under it, and the keys that lead to it,
+    outermost first."""
 
     word: str
     keys: tuple[str, ...]
 
     @classmethod
     def at(cls, text: str, line: int, column: int) -> Cursor:
-        """That at a line and column counted from one."""
+        """Find the place at a line and column counted from one."""
         lines = text.splitlines()
         row = lines[line - 1] if line <= len(lines) else ""
         found = (m[0] for m in WORD.finditer(row) if m.start() < column <= m.end() + 1)
@@ -76,7 +78,7 @@ class Cursor:
 
 
 def _keys(node: Node, at: tuple[int, int]) -> tuple[str, ...]:
-    """The keys on the way to the value, or the key, that begins last before a place."""
+    """Return the keys on the way to the value, or the key, that begins last before a place."""
     if isinstance(node, MapNode):
         before = [e for e in node if (e.key_where.line, e.key_where.column) <= at]
         return (before[-1].key, *_keys(before[-1].value, at)) if before else ()
@@ -101,7 +103,7 @@ class GraphText:
         self.graph: FlatGraph = flatten_text(text, path, (), Problems())
 
     def hover(self, line: int, column: int) -> str:
-        """What is under the cursor, in Markdown; empty for nothing that is known."""
+        """Describe the thing under the cursor, in Markdown; empty for an unknown one."""
         cursor = Cursor.at(self.text, line, column)
         if cursor.keys[-1:] == ("use",) or cursor.word in self._uses():
             known = self._reference(cursor.word)
@@ -127,7 +129,8 @@ class GraphText:
         )
 
     def definition(self, line: int, column: int) -> Position | None:
-        """Where the thing under the cursor is: a block in its file, a class in Python, an included file."""
+        """Find the definition of the thing under the cursor: a block in its file, a class in
+        Python, an included file."""
         cursor = Cursor.at(self.text, line, column)
         if cursor.word.endswith((".yaml", ".yml")) or cursor.word.startswith(PREFIX):
             file = graph_path(cursor.word, self.path.parent)
@@ -142,7 +145,8 @@ class GraphText:
         return None if block is None else block.where
 
     def _source(self, word: str) -> list[str]:
-        """A word as the path of a block, the longest that there is, then its port and field."""
+        """Split a word into the path of a block, the longest that there is, then its port and
+        field."""
         parts = word.split(".")
         for count in range(len(parts), 0, -1):
             if self._block(".".join(parts[:count])) is not None:
@@ -170,7 +174,7 @@ class GraphText:
         return None if found is None else block_reference(use, found)
 
     def _declared(self, block: FlatBlock, keys: tuple[str, ...]) -> str:
-        """The text of a parameter or an input of a block."""
+        """Return the text of a parameter or an input of a block."""
         known = self._reference(block.use)
         if known is None or len(keys) < 2:
             return ""
@@ -193,7 +197,7 @@ class GraphText:
 
 
 def make_server() -> LanguageServer:
-    """The server, which has not begun to read.
+    """Make the server, which has not begun to read.
 
     Raises:
         AloftError: the extra ``editor`` is not installed.
@@ -267,5 +271,5 @@ def make_server() -> LanguageServer:
 
 
 def is_graph(text: str) -> bool:
-    """Whether a YAML text looks like a graph file."""
+    """Tell whether a YAML text looks like a graph file."""
     return any(line.startswith(KEYS) for line in text.splitlines())

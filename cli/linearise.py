@@ -140,7 +140,7 @@ def linearise(
 
 
 def band_of(text: str) -> tuple[float, float]:
-    """The frequencies of ``low:high``. Raises ``AloftError``."""
+    """Parse the frequencies of ``low:high``. Raises ``AloftError``."""
     try:
         low, high = map(float, text.split(":"))
     except ValueError:
@@ -151,7 +151,7 @@ def band_of(text: str) -> tuple[float, float]:
 
 
 def predicted(model: Linearisation, measured: FrequencyResponse) -> Any:
-    """What the model says of a measured response, (frequencies,)."""
+    """Compute the model's prediction of a measured response, (frequencies,)."""
     from ..analysis.loop_margins import loop_responses
 
     w = 2.0 * math.pi * measured.frequency

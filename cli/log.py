@@ -85,7 +85,7 @@ def export(
 ) -> None:
     """Write the signals of a recording, every number exact, into a file of another format."""
     from ..logs.exporting.export import export as write_export
-    from ..logs.recording.place import remedy
+    from ..logs.recording.output_file import remedy
 
     with errors_reported(as_json):
         asked = {"csv": csv, "parquet": parquet, "mcap": mcap, "bag": bag}
@@ -154,16 +154,16 @@ def compare(
 
 @log.command("repair")
 def repair(file: File, as_json: AsJson = False) -> None:
-    """Repair a recording in place: what was cut off or is damaged is taken out, the rest is kept."""
+    """Repair a recording in place: remove cut or damaged messages, and keep the rest."""
     from ..logs.file.repair import repair as mend
-    from ..logs.recording.place import is_being_written, whole_of
+    from ..logs.recording.output_file import finished_name, is_being_written
 
     with errors_reported(as_json):
         try:
             if is_being_written(file):
                 raise AloftError(f"{file} is being written just now; wait for the end of the run")
             done = mend(file)
-            name = whole_of(file)
+            name = finished_name(file)
             if name is not None and not name.exists():
                 file = file.rename(name)
         except OSError as error:
@@ -207,12 +207,12 @@ def merge(
         run_hash_of,
     )
     from ..logs.replay.opened_run import OpenedRun
-    from ..runtime.placement.placed import place
+    from ..runtime.placement.placed import split_over_machines
     from ..runtime.running.memory import BoundGraph
 
     with errors_reported(as_json):
         runs = {file: read(file) for file in files}
-        placed = place(OpenedRun.of(files[0]).graph)
+        placed = split_over_machines(OpenedRun.of(files[0]).graph)
         paths: dict[str, Path] = {}
         for file, run in runs.items():
             machine = machine_of(placed, run)
@@ -235,7 +235,7 @@ def merge(
 
 
 def summary(run: RecordedRun) -> dict[str, Any]:
-    """The summary of a recording as plain data."""
+    """Summarise a recording as plain data."""
     header, outcome, ticks = run.header, run.outcome, run.ticks
     duration = len(ticks) / header.base_rate
     return {
@@ -273,7 +273,7 @@ def summary(run: RecordedRun) -> dict[str, Any]:
 
 
 def plain(value: Any) -> str:
-    """A value as the text of a table's cell."""
+    """Write a value as the text of a table's cell."""
     if isinstance(value, dict):
         return ", ".join(f"{key} {entry}" for key, entry in value.items())
     if isinstance(value, list):

@@ -26,7 +26,7 @@ Folder = Annotated[Path, typer.Option("--in", help="The folder to write into.")]
 
 
 def run_tests() -> str:
-    """The command that runs tests; pytest comes with what is for development, not with aloft."""
+    """Return the command that runs tests; pytest comes with the development tools, not with aloft."""
     return "pytest" if find_spec("pytest") is not None else "pip install pytest; pytest"
 
 
@@ -34,7 +34,7 @@ def run_tests() -> str:
 def project(
     name: Annotated[str, typer.Argument(help="The folder's name, such as my_robot.")],
 ) -> None:
-    """A folder with a graph, a block, their tests, a README and a schema for editors."""
+    """Make a folder with a graph, a block, their tests, a README and a schema for editors."""
     with errors_reported(False):
         folder = Path(name)
         title = folder.name.replace("_", " ").replace("-", " ")
@@ -57,7 +57,7 @@ def block(
     name: Annotated[str, typer.Argument(help="The class's name, such as LegSpring.")],
     folder: Folder = Path(),
 ) -> None:
-    """A block that works, with its test."""
+    """Make a block that works, with its test."""
     with errors_reported(False):
         files = _block_files(name)
         _write(folder, files)
@@ -70,7 +70,7 @@ def graph(
     name: Annotated[str, typer.Argument(help="The file's name without its ending.")],
     folder: Folder = Path(),
 ) -> None:
-    """A graph of library blocks that runs, and the schema with which editors complete it."""
+    """Make a graph of library blocks that runs, and the schema with which editors complete it."""
     with errors_reported(False):
         file = f"{_module(name)}.yaml"
         files = {file: templates.GRAPH.format(file=file)}
@@ -85,7 +85,8 @@ def robot(
     name: Annotated[str, typer.Argument(help="The robot's name, such as pendulum.")],
     folder: Folder = Path(),
 ) -> None:
-    """A robot with one motor as MJCF, what MJCF lacks beside it, a graph that holds it, a test."""
+    """Make a robot with one motor as MJCF, a YAML of everything that MJCF lacks, a graph that holds
+    it, and a test."""
     with errors_reported(False):
         module = _module(name)
         command = "value: {mode: 1, position: 0.5, stiffness: 30, damping: 1}"
@@ -102,7 +103,8 @@ def robot(
 
 
 def _block_files(name: str) -> dict[str, str]:
-    """The files of a block called ``name``. Raises ``AloftError`` if no class can be called so."""
+    """Return the files of a block called ``name``. Raises ``AloftError`` if no class can be called
+    so."""
     from ..runtime.language.registry import snake_case
 
     if not name.isidentifier() or keyword.iskeyword(name) or not name[0].isupper():
@@ -118,7 +120,7 @@ def _block_files(name: str) -> dict[str, str]:
 
 
 def _module(name: str) -> str:
-    """The name, if files and modules can have it. Raises ``AloftError`` otherwise."""
+    """Return the name, if files and modules can have it. Raises ``AloftError`` otherwise."""
     if not name.isidentifier() or keyword.iskeyword(name):
         likely = re.sub(r"\W+", "_", name).strip("_").lower()
         hint = f"; for instance {likely}" if likely.isidentifier() else ""

@@ -102,7 +102,7 @@ def web(
 
 
 def ask_list(run: str) -> tuple[str, list[dict[str, Any]]]:
-    """The graph's name and all its parameters. Raises ``AloftError``."""
+    """Ask for the graph's name and all its parameters. Raises ``AloftError``."""
     from ..runtime.live.parameter_endpoint import ask
     from .shared.running_graphs import find
 
@@ -111,7 +111,7 @@ def ask_list(run: str) -> tuple[str, list[dict[str, Any]]]:
 
 
 def value_of(name: str, found: list[dict[str, Any]]) -> Any:
-    """The value of ``block.parameter``, or of something inside it. Raises ``AloftError``."""
+    """Return the value of ``block.parameter``, or of something inside it. Raises ``AloftError``."""
     for entry in found:
         if name == entry["path"]:
             return entry["value"]
@@ -126,7 +126,7 @@ def value_of(name: str, found: list[dict[str, Any]]) -> Any:
 
 
 def text_of(value: Any) -> str:
-    """A value as it is written in a graph file."""
+    """Write a value as in a graph file."""
     from ..files.nodes import text_of
 
     return text_of(value)

@@ -57,7 +57,7 @@ class LibraryOptions:
 
 @dataclass(frozen=True)
 class PoolOptions:
-    """Where a grid is planned."""
+    """The processes or the cluster that plan a grid."""
 
     workers: Annotated[
         int, typer.Option(help="Worker processes for a grid; 0: one per core.", min=0)
@@ -69,7 +69,7 @@ class PoolOptions:
 
 @dataclass(frozen=True)
 class SearchOptions:
-    """What is done beside planning a task."""
+    """The options of planning a task."""
 
     nearest: Annotated[
         bool,
@@ -243,7 +243,7 @@ def search_nearest(
 
 
 def solver_with_progress(tell: Any) -> Any:
-    """The planner, which prints what it is compiling."""
+    """Return the planner, which prints what it is compiling."""
     from ..planner.solving.solve import solve_jump
 
     def make(
@@ -260,7 +260,7 @@ def solver_with_progress(tell: Any) -> Any:
 def write_pictures(
     found: PlannedJump, robot: RobotDescription, out: Path, screen: Console
 ) -> dict[str, str]:
-    """The picture and the recording of a plan."""
+    """Write the picture and the recording of a plan."""
     from ..logs.recording.motion_recording import write_motion
     from ..planner.drawing.picture import write_picture
 

@@ -47,7 +47,7 @@ def plot(
 
 
 def panels_of(run: RecordedRun, name: str, start: float | None, end: float | None) -> list[Panel]:
-    """One panel for every field that ``name`` says.
+    """Make one panel for every field that ``name`` says.
 
     Raises:
         AloftError: there is no such signal or element, or nothing was recorded in that time.
@@ -113,7 +113,7 @@ def _draw(panels: Sequence[Panel], title: str, svg: Path | None, png: Path | Non
 
 
 def in_terminal(panel: Panel) -> str:
-    """A panel as text: Braille dots, the range of values on the left, that of time below."""
+    """Draw a panel as text: Braille dots, the range of values on the left, that of time below."""
     x = np.asarray(panel.lines[0].x)
     y = np.array([line.y for line in panel.lines])
     finite = y[np.isfinite(y)]

@@ -113,7 +113,7 @@ def _panels(
     start: float | None,
     end: float | None,
 ) -> list[Panel]:
-    """The panels of all signals, each with the curves of all runs."""
+    """Make the panels of all signals, each with the curves of all runs."""
     from .plot import panels_of
 
     joined = []

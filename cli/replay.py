@@ -98,7 +98,7 @@ def replay(
 
 
 def changed_blocks(opened: OpenedRun, swaps: list[str], sets: list[str]) -> dict[str, list[str]]:
-    """The changes as overrides, by block. Raises ``AloftError``."""
+    """Return the changes as overrides, by block. Raises ``AloftError``."""
     from ..runtime.language.registry import find_block
 
     changed: dict[str, list[str]] = {}
@@ -169,7 +169,7 @@ def write(output: Path, opened: OpenedRun, done: Replayed) -> Path:
 
 
 def describe(opened: OpenedRun, done: Replayed) -> str:
-    """The verdict in one line."""
+    """Describe the verdict in one line."""
     ticks, states = done.signals.compared, done.states.compared
     ran = "all blocks" if len(done.ran) == len(done.bound.blocks) else ", ".join(done.ran)
     what = f"{ticks} ticks from {done.first_tick} on"
@@ -203,7 +203,7 @@ def print_differences(out: Console, done: Replayed) -> None:
 
 
 def _units(done: Replayed) -> dict[str, str]:
-    """The unit of every field, by name."""
+    """Return the unit of every field, by name."""
     return {
         f"{spec.path}.{port}.{name}": "" if field.unit is None else str(field.unit)
         for spec in done.bound.graph.blocks
@@ -220,7 +220,7 @@ def as_data(
     restored: list[str],
     written: Path | None,
 ) -> dict[str, Any]:
-    """The whole result as plain data."""
+    """Return the whole result as plain data."""
     first = done.first
     return {
         "success": done.identical,

@@ -59,7 +59,7 @@ def show(
     """Print the tree, masses, limits, motors, feet and sensors of a robot, and what is missing."""
     from ..robots.report import report
 
-    with _faults_reported(as_json):
+    with _description_errors_reported(as_json):
         found = _read(name)
         about = report(found)
         if picture is not None:
@@ -79,7 +79,7 @@ def check_up(name: Name, as_json: AsJson = False) -> None:
     """Look for what seems wrong: masses, inertias, axes, limits, sides, standing torque, bandwidth."""
     from ..studies import check_up as looking
 
-    with _faults_reported(as_json):
+    with _description_errors_reported(as_json):
         found = looking.check_up(_read(name).description)
     if as_json:
         print_json({"success": True, **found})
@@ -128,7 +128,7 @@ def import_(
     as_json: AsJson = False,
 ) -> None:
     """Write the short YAML beside a URDF or MJCF file, filled with what can be found or guessed."""
-    with _faults_reported(as_json):
+    with _description_errors_reported(as_json):
         target, text, notes = _imported(file, out, force)
         try:
             target.write_text(text, encoding="utf-8")
@@ -153,7 +153,7 @@ def export(
     urdf: Annotated[bool, typer.Option("--urdf", help="As a URDF, which is the default.")] = True,
 ) -> None:
     """Write a robot as a URDF: links, joints, shapes, contact points, effort and speed limits."""
-    with _faults_reported(False):
+    with _description_errors_reported(False):
         from ..robots.urdf_export import hull_meshes, urdf_of
 
         described = _read(name).description
@@ -179,8 +179,9 @@ def export(
 
 
 @contextmanager
-def _faults_reported(as_json: bool) -> Iterator[None]:
-    """As ``errors_reported``; a robot's faults are printed one by one, or listed in the JSON."""
+def _description_errors_reported(as_json: bool) -> Iterator[None]:
+    """Report errors as ``errors_reported`` does; a robot's errors are printed one by one, or listed
+    in the JSON."""
     from ..robots.validation import RobotError
 
     with errors_reported(as_json):
@@ -192,16 +193,16 @@ def _faults_reported(as_json: bool) -> Iterator[None]:
             if not as_json:
                 print_error(str(error))
                 raise typer.Exit(ExitCode.BAD_INPUT) from error
-            faults = [
+            errors = [
                 {
-                    "file": fault.file or error.file, "line": fault.line, "column": fault.column,
-                    "path": list(fault.path), "message": fault.message,
-                    "expected": fault.expected, "found": fault.found, "fix": fault.fix,
+                    "file": description_error.file or error.file, "line": description_error.line, "column": description_error.column,
+                    "path": list(description_error.path), "message": description_error.message,
+                    "expected": description_error.expected, "found": description_error.found, "fix": description_error.fix,
                 }
-                for fault in error.faults
+                for description_error in error.errors
             ]  # fmt: skip
             headline = str(error).splitlines()[-1]
-            print_json({"success": False, "reason": headline, "faults": faults})
+            print_json({"success": False, "reason": headline, "errors": errors})
             raise typer.Exit(ExitCode.BAD_INPUT) from error
 
 
@@ -221,8 +222,8 @@ def _draw(found: ReadRobot, picture: Path) -> None:
 
 
 def _imported(file: Path, out: Path | None, force: bool) -> tuple[Path, str, list[str]]:
-    """Where the YAML goes, its text and its notes. Raises ``RobotError`` for a file that is wrong
-    and ``AloftError`` for one that must not be written."""
+    """Return the path of the YAML, its text and its notes. Raises ``RobotError`` for a file that is
+    wrong and ``AloftError`` for one that must not be written."""
     from ..robots.description import MODEL_FILES, OTHER_FORMATS, read
     from ..robots.importing.new_yaml import new_yaml
 
@@ -286,7 +287,7 @@ def _print_robot(out: Console, about: dict[str, Any]) -> None:
 
 
 def _of_joints(row: dict[str, Any]) -> str:
-    """The joints that a motor moves, where its name does not say it."""
+    """Name the joints that a motor moves, where its name does not say it."""
     return "" if row["joints"] == [row["motor"]] else f" ({', '.join(row['joints'])})"
 
 
@@ -455,7 +456,7 @@ def graph_values(
     delay: IdentifiedDelay,
     file: Path,
 ) -> str:
-    """The values as a graph's ``set``, for the blocks of the recorded graph that take them."""
+    """Return the values as a graph's ``set``, for the blocks of the recorded graph that take them."""
 
     def path(kind: str, usual: str) -> str:
         found = (b.path for b in run.header.blocks if b.type.rpartition(":")[2] == kind)

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 class Live(StrEnum):
-    """Where a run is shown while it goes on."""
+    """The options of showing a run while it goes on."""
 
     NONE = "none"
     LIVE = "live"
@@ -43,7 +43,7 @@ class Live(StrEnum):
 
 @dataclass(frozen=True)
 class GraphOptions:
-    """What is changed in the graph, and how often and how long it runs."""
+    """The options that change the graph, and the number and the duration of its runs."""
 
     overrides: CompletedOverrides = None
     seeds: Annotated[
@@ -56,7 +56,7 @@ class GraphOptions:
 
 @dataclass(frozen=True)
 class ObservationOptions:
-    """How the run is recorded, shown and reached."""
+    """The options of recording, showing and reaching a run."""
 
     record: Annotated[
         Path | None,
@@ -92,7 +92,7 @@ class ObservationOptions:
 
 @dataclass(frozen=True)
 class PrintingOptions:
-    """What is printed."""
+    """The options of printing."""
 
     as_json: JsonBesideTables = False
     quiet: Quiet = False
@@ -103,7 +103,7 @@ class PrintingOptions:
 
 @dataclass(frozen=True)
 class PartOptions:
-    """Which parts of a graph on several machines run here."""
+    """The options that choose the parts of a graph on several machines that run here."""
 
     machine: Annotated[
         str, typer.Option(help="Run only the part of this machine, together with the others.")
@@ -119,7 +119,7 @@ class PartOptions:
 
 @dataclass(frozen=True)
 class CompilingOptions:
-    """What is compiled."""
+    """The options of compiling."""
 
     plain: Annotated[
         bool,
@@ -137,7 +137,7 @@ class CompilingOptions:
 
 @dataclass(frozen=True)
 class ThreadOptions:
-    """What the control thread asks of the operating system."""
+    """The control thread's requests to the operating system."""
 
     cpu: Annotated[
         int | None, typer.Option(min=0, help="Pin the control thread to this processor.")
@@ -221,7 +221,7 @@ def run(
 
 @contextmanager
 def recorder_started(*, wanted: bool) -> Iterator[RecorderLink | None]:
-    """The recorder's process if one is wanted, which starts while the graph is loaded."""
+    """Start the recorder's process if one is wanted, while the graph is loaded."""
     from ..logs.recording.recorder_link import start_early
 
     link = start_early() if wanted else None
@@ -255,7 +255,7 @@ def check_combination(
 
 
 def split_time(text: str) -> float:
-    """The time [s] in ``--split``; zero if it is empty. Raises ``AloftError``."""
+    """Parse the time [s] in ``--split``; zero if it is empty. Raises ``AloftError``."""
     from ..runtime.language.errors import UnitError
     from ..runtime.language.units import parse_quantity
 

@@ -23,7 +23,7 @@ from .shared.run_graph import OneRunOptions, run_many, run_once
 
 @dataclass(frozen=True)
 class StandOptions:
-    """What it does while it stands."""
+    """The options of standing."""
 
     squat: Annotated[
         str,
@@ -72,7 +72,9 @@ def stand(
             code = run_many(path, settings, parse_seeds(running.seeds), out, as_json)
         else:
             loaded = load(path, overrides_for(loaded, settings, running.seed))
-            options = OneRunOptions(record=recording.place("stand"), as_json=as_json, times=False)
+            options = OneRunOptions(
+                record=recording.path_for("stand"), as_json=as_json, times=False
+            )
             also = {"asked": {"squat_depth": depth, "push_speed": speed}, **about}
             code = run_once(loaded, options, out, also=also)
     raise typer.Exit(code)

@@ -113,7 +113,7 @@ def plan_hops(name: str, out: Console) -> None:
 
 
 def read_commands(path: Path) -> list[Any]:
-    """The list in a file of commands, for the parameter ``commands`` of ``CommandSchedule``.
+    """Read the list in a file of commands, for the parameter ``commands`` of ``CommandSchedule``.
 
     Raises:
         AloftError: there is no file, it is no YAML, or it is no list.

@@ -87,7 +87,7 @@ def study(
     """
     from ..studies.batch.seeds import parse_seeds
     from ..studies.comparison import Comparing, compared_axis, read_detect
-    from ..studies.reading import part_of, read_study
+    from ..studies.reading import read_study, rows_where
     from .shared.paper import NAME, draw_paper
 
     screen = console(to_stderr=as_json)
@@ -103,7 +103,7 @@ def study(
         found = read_study(file)
         chosen = parse_seeds(seeds) if seeds else list(found.seeds)
         folder = out or Path("results") / found.name
-        part = part_of(found, where or [])
+        part = rows_where(found, where or [])
         if not asked.sensitivity and asked != SensitivityOptions():
             raise AloftError(
                 "--vary, --spread, --trajectories, --sobol and --samples go with --sensitivity"
@@ -204,7 +204,7 @@ def run_study(
 
 
 def json_text(value: dict[str, Any]) -> str:
-    """The text of a JSON file; numbers that are not finite become null."""
+    """Write the text of a JSON file; numbers that are not finite become null."""
     import json
 
     from .shared.output import plain

@@ -95,7 +95,7 @@ class Target:
 
 
 def sort_targets(targets: list[str]) -> tuple[list[Target], list[str]]:
-    """Blocks, and paths for pytest.
+    """Sort the targets into blocks, and paths for pytest.
 
     Raises:
         LoadError: a graph may not run.
@@ -131,7 +131,7 @@ def sort_targets(targets: list[str]) -> tuple[list[Target], list[str]]:
 
 
 def check(target: Target, robot: str) -> list[Row]:
-    """The checks of one block, one for each thing that every block promises.
+    """Run the checks of one block, one for each promise of every block.
 
     A ``robot`` that is named takes the place of the target's own.
     """
@@ -232,7 +232,7 @@ def write(
 
 
 def parse_ticks(text: str) -> tuple[int, int]:
-    """``1200:1400`` as two numbers. Raises ``AloftError``."""
+    """Parse ``1200:1400`` as two numbers. Raises ``AloftError``."""
     first, colon, last = text.partition(":")
     try:
         return int(first), int(last) if colon else int(first) + 1

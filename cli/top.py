@@ -1,4 +1,4 @@
-"""``aloft top`` and ``aloft watch``: what the machines of a running graph do, as a table or in the viewer."""
+"""``aloft top`` and ``aloft watch``: the machines of a running graph, as a table or in the viewer."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def top(
 
 
 def report(observer: Observer) -> dict[str, Any]:
-    """The status of each machine; of one that was never heard only its state."""
+    """Return the status of each machine; of one that was never heard only its state."""
     return {
         spec.name: {
             "state": observer.state_of(spec.name),

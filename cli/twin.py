@@ -47,7 +47,7 @@ def twin(
     """
     from ..hal.bear.configuration import Hardware
     from ..hal.simulated.parameters import SimulatorParameters
-    from ..hal.twin.faults import read_fault
+    from ..hal.twin.injected_faults import read_fault
     from ..hal.twin.server import TwinServer
     from ..hal.twin.twin import standing_twin
     from ..robots.description import RobotError, find_robot
@@ -81,7 +81,7 @@ def twin(
 
 
 def _wait(seconds: float) -> None:
-    """Until SIGINT or SIGTERM, or the end of the time."""
+    """Wait until SIGINT or SIGTERM, or the end of the time."""
     ended = False
 
     def end(number: int, frame: object) -> None:
@@ -99,11 +99,11 @@ def _wait(seconds: float) -> None:
 
 
 def _settings(texts: list[str]) -> dict[str, Any]:
-    """``name=value`` texts as parameters. Raises ``AloftError``."""
+    """Parse ``name=value`` texts as parameters. Raises ``AloftError``."""
     import yaml
 
     from ..hal.simulated.parameters import SimulatorParameters
-    from ..robots.validation.faults import nearest
+    from ..robots.validation.errors import nearest
     from ..runtime.language.parameters import declared_fields
 
     known = {**SimulatorParameters.model_fields, **dict(declared_fields(SimulatorParameters))}

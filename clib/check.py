@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..logs.file.reader import RecordedRun, read
 from ..runtime.language.errors import AloftError
 from ..runtime.language.layout import Layout
-from .library import Library, views
+from .library import SharedLibrary, views
 from .module import Status
 from .targets import TARGETS
 
@@ -117,7 +117,7 @@ def _run(
     """Return the memory of an instance after each step, (ticks, bytes), and the median duration of one."""
     size = about["memory_bytes"]
     if about["target"] == "x86_64":
-        library = Library(description)
+        library = SharedLibrary(description)
         memories = np.empty((len(steps), size), np.uint8)
         times = np.empty(len(steps))
         for k, row in enumerate(steps):

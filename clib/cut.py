@@ -144,7 +144,7 @@ def _read_from_outside(inside: Sequence[FlatBlock], specs: Mapping[str, BlockSpe
                 wanted = specs[block.path].block_type.inputs[name].signal.fields
                 before = ports.get(each.source_port, {})
                 ports[each.source_port] = (
-                    None if wire.parts or before is None else {**before, **dict.fromkeys(wanted)}
+                    None if wire.slices or before is None else {**before, **dict.fromkeys(wanted)}
                 )
     return found
 
@@ -200,7 +200,7 @@ def _stubs(
 def _terminals(
     name: str, spec: BlockSpec, port: str, wanted: Mapping[str, None] | None
 ) -> list[Terminal]:
-    """One terminal for each field of an output; ``name`` alone if the only field is ``value``."""
+    """Return one terminal for each field of an output; ``name`` alone if the only field is ``value``."""
     fields: Mapping[str, Field] = spec.block_type.outputs[port].signal.fields
     plain = list(fields) == ["value"]
     return [
@@ -289,8 +289,9 @@ def _read_by(
 def _ancestors(
     blocks: Iterable[str], specs: Mapping[str, BlockSpec], outside: Container[str]
 ) -> dict[str, None]:
-    """Blocks and all on which they depend, in this tick or through earlier ones, but not through
-    what is outside."""
+    """Return the blocks and all on which they depend, in this tick or through earlier ones, but not through what is
+    outside.
+    """
     found: dict[str, None] = {}
     pending = list(blocks)
     while pending:
@@ -302,7 +303,7 @@ def _ancestors(
 
 
 def _whole(name: str, wire: FlatWire, inside: Iterable[str]) -> str:
-    if wire.parts or wire.constant is not None or wire.delay or wire.source_block not in inside:
+    if wire.slices or wire.constant is not None or wire.delay or wire.source_block not in inside:
         raise AloftError(
             f"the output {name!r} of the sub-graph is not one whole output of a block in it; "
             "name outputs of blocks with --output block.port"

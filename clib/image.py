@@ -40,7 +40,7 @@ class Piece:
     offset: int = 0
 
     def content(self) -> bytes:
-        """Its present bytes."""
+        """Return its present bytes."""
         return ctypes.string_at(self.first, self.end - self.first)
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..runtime.language.errors import AloftError
 
 
-class Library:
+class SharedLibrary:
     """One instance of a library, in memory of its own.
 
     Args:
@@ -70,7 +70,7 @@ class Library:
         self._in[:] = inputs
 
     def step(self) -> int:
-        """One tick: from ``inputs`` to ``outputs``. Returns the status."""
+        """Make one tick: from ``inputs`` to ``outputs``. Returns the status."""
         return int(self._step(self._self, *self._arguments))
 
     @property

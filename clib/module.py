@@ -23,7 +23,7 @@ from ..mathematics.compiling.llvm_code import leaves, number
 from ..mathematics.compiling.machine_code import read_only_arguments
 from ..mathematics.compiling.translate import ATTRIBUTES, Translator
 from .image import Image
-from .part import Part, terminal_groups
+from .part import SubGraph, terminal_groups
 
 
 class Status(IntEnum):
@@ -54,7 +54,7 @@ MARK, CODE, BLOCK = 0, 8, 12
 
 
 @dataclass(frozen=True)
-class Call:
+class ScheduledCall:
     """A call of a kernel in a tick: by the block of a number, in ticks of a period and offset."""
 
     call: KernelCall
@@ -79,7 +79,7 @@ class Module:
     def __init__(
         self,
         name: str,
-        part: Part,
+        part: SubGraph,
         mark: int,
         texts: dict[str, str],
         functions: Mapping[str, Sequence[KernelCall]] | None = None,
@@ -120,13 +120,13 @@ class Module:
         self.output_fields, self.output_size = self._struct(part.cut.outputs)
         self.state_size = 16 + sum(each.size for each in self.regions)
 
-    def _list(self, paths: Sequence[str], which: str) -> list[Call]:
+    def _list(self, paths: Sequence[str], which: str) -> list[ScheduledCall]:
         found = []
         for path in paths:
             spec = self.part.graph.block(path)
             calls = getattr(self.part.bound.blocks[path], which)
             found += [
-                Call(
+                ScheduledCall(
                     call, self.part.blocks.index(path), spec.period_ticks,
                     spec.offset_ticks % spec.period_ticks, call is calls[-1],
                 )
@@ -299,7 +299,7 @@ class Module:
             code(f"store i32 %who, ptr {code.at(BLOCK)}")
             code(f"ret i32 {int(Status.DIVIDED_BY_ZERO)}")
 
-    def _make(self, code: _Code, calls: Sequence[Call], *, events: bool) -> None:
+    def _make(self, code: _Code, calls: Sequence[ScheduledCall], *, events: bool) -> None:
         """Make calls, those of slower blocks in their ticks only."""
         for (period, offset), group in groupby(calls, lambda each: (each.period, each.offset)):
             after = code.name("rate")

@@ -40,7 +40,7 @@ class NumberParameter(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Part:
+class SubGraph:
     """A part of a graph, bound to memory of its own.
 
     Attributes:
@@ -61,13 +61,13 @@ class Part:
 
     @property
     def moore(self) -> tuple[str, ...]:
-        """Those of the blocks whose state is updated after all outputs."""
+        """Blocks whose state is updated after all outputs."""
         return tuple(path for path in self.blocks if type(self.bound.blocks[path]).is_moore())
 
 
 def take_part(
     path: str, part: str = "", overrides: Sequence[str] = (), outputs: Sequence[str] = ()
-) -> Part:
+) -> SubGraph:
     """Return the part of a graph that a library shall compute.
 
     Args:
@@ -105,7 +105,7 @@ def take_part(
     if problems:
         raise NeedsPython(problems)
     live = [item for each in order for item in _parameters(bound.blocks[each])]
-    return Part(
+    return SubGraph(
         found, graph, bound, order,
         tuple(each for each in live if isinstance(each, NumberParameter)),
         tuple(each for each in live if isinstance(each, str)),
@@ -113,7 +113,7 @@ def take_part(
 
 
 def _outside(specs: dict[str, BlockSpec], graph: CheckedGraph) -> list[BlockSpec]:
-    """Stand-ins for the blocks that are read and are not inside; they only have memory."""
+    """Return stand-ins for the blocks that are read and are not inside; they only have memory."""
     read: dict[str, dict[str, None]] = {}
     for spec in specs.values():
         for wire in spec.wires.values():
@@ -132,7 +132,7 @@ def _outside(specs: dict[str, BlockSpec], graph: CheckedGraph) -> list[BlockSpec
 
 
 def _nothing(self: Block) -> None:
-    """Somebody else writes the outputs."""
+    """Leave the outputs to their writer outside."""
 
 
 def needs_python(block: Block) -> Iterator[str]:

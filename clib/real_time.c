@@ -2,7 +2,7 @@
  *
  *     main MEMORY [--lockstep] [--priority N]
  *
- * MEMORY is a file that this process makes, best in /dev/shm; blocks.Library with `memory: MEMORY` is the
+ * MEMORY is a file that this process makes, best in /dev/shm; blocks.CLibrary with `memory: MEMORY` is the
  * other side. In real time a tick is made in every period of the library, with the newest inputs; deadlines that
  * were missed are counted, and told at the end. With --lockstep a tick is made whenever inputs are given. */
 #include <errno.h>

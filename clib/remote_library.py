@@ -28,7 +28,7 @@ PATIENCE = 1.0
 """Seconds within which the process has to answer."""
 
 
-class RemoteLibrary:
+class RemoteSharedLibrary:
     """The side of the graph of a library that runs in a process of its own.
 
     In lockstep a step waits for the outputs of its inputs. In real time it gives its inputs, and takes
@@ -39,7 +39,7 @@ class RemoteLibrary:
         memory: the file that the process has made.
 
     Attributes:
-        inputs, outputs: as of ``Library``.
+        inputs, outputs: as of ``SharedLibrary``.
 
     Raises:
         AloftError: there is no such process, or it runs another library.
@@ -88,7 +88,7 @@ class RemoteLibrary:
         )
 
     def step(self) -> int:
-        """One tick, or in real time one exchange. Returns the status of the last tick.
+        """Make one tick, or in real time one exchange. Returns the status of the last tick.
 
         Raises:
             AloftError: the process does not answer.

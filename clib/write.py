@@ -14,7 +14,7 @@ from ..runtime.language.errors import AloftError
 from ..runtime.language.layout import Layout
 from .cut import Terminal
 from .module import STATUS_TEXTS, Module, Status
-from .part import Part, take_part, terminal_groups
+from .part import SubGraph, take_part, terminal_groups
 from .targets import TARGETS, compile_module, link
 
 _C_TYPES = {"float64": "double", "int64": "int64_t", "bool": "uint8_t"}
@@ -31,7 +31,7 @@ class Prepared:
     """Ingredients of a library: its name, the part, the code, and the content of ``NAME.json``."""
 
     name: str
-    part: Part
+    part: SubGraph
     module: Module
     about: dict[str, Any]
 
@@ -124,7 +124,7 @@ def prepare(
 
 
 def _describe(
-    name: str, target: str, part: Part, module: Module, texts: dict[str, str]
+    name: str, target: str, part: SubGraph, module: Module, texts: dict[str, str]
 ) -> dict[str, Any]:
     """Return the content of ``NAME.json``."""
     memory = part.bound.memory
@@ -160,7 +160,7 @@ def _terminals(
     ]
 
 
-def _slots(layout: Layout, place: int, part: Part) -> dict[str, Any]:
+def _slots(layout: Layout, place: int, part: SubGraph) -> dict[str, Any]:
     """Return the first byte in an instance, type and shape of each signal or state of the blocks inside."""
     return {
         name: [place + layout.byte_range(name)[0], slot.section, list(slot.shape)]
@@ -197,7 +197,7 @@ def _struct(name: str, kind: str, terminals: Sequence[Terminal]) -> str:
     return "\n".join((*lines, f"}} {name}_{kind};"))
 
 
-def _header(name: str, part: Part, about: dict[str, Any]) -> str:
+def _header(name: str, part: SubGraph, about: dict[str, Any]) -> str:
     upper = name.upper()
     codes = "\n".join(
         f"    {upper}_{each.name} = {int(each)}, /* {STATUS_TEXTS[each]} */" for each in Status
@@ -271,7 +271,7 @@ const char *{name}_block_name(int32_t block);
 """
 
 
-def _example(name: str, part: Part) -> str:
+def _example(name: str, part: SubGraph) -> str:
     starts = []
     for port, fields in terminal_groups(part.cut.inputs).items():
         for field, each in fields:
@@ -344,7 +344,7 @@ endif()
 """
 
 
-def _readme(name: str, about: dict[str, Any], part: Part) -> str:
+def _readme(name: str, about: dict[str, Any], part: SubGraph) -> str:
     sizes = "\n".join(
         f"| `{file}` | {each['bytes']} bytes |" for file, each in about["files"].items()
     )

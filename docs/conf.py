@@ -67,7 +67,8 @@ def list_versions(app: Any, failure: Exception | None) -> None:
 
 
 def keep_colons(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
-    """What stands before a colon in the text of an attribute is no type, as Google's style has it."""
+    """Keep text before a colon in an attribute's docstring from being read as a type, as Google's
+    style has it."""
     if what in ("attribute", "data", "property"):
         lines.insert(0, "")
 

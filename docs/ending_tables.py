@@ -12,7 +12,8 @@ UPRIGHT = 12.0
 
 
 def ground_table(runs: Sequence[Row], of: str) -> str:
-    """One row for each value of the column ``of``, one column an arm: how many succeed, how many end upright."""
+    """Format one row for each value of the column ``of``, one column an arm: the numbers that
+    succeed, and that end upright."""
     groups: dict[str, dict[str, list[Row]]] = {}
     for run in runs:
         groups.setdefault(run[of], {}).setdefault(
@@ -27,7 +28,7 @@ def ground_table(runs: Sequence[Row], of: str) -> str:
 
 
 def _landed(runs: Sequence[Row]) -> tuple[str, str]:
-    """How many runs succeed, and how many end upright."""
+    """Return the numbers of runs that succeed, and that end upright, as text."""
     if not runs:
         return "-", "-"
     tilts = [run["final_tilt_deg"] for run in runs]
@@ -36,7 +37,8 @@ def _landed(runs: Sequence[Row]) -> tuple[str, str]:
 
 
 def fault_table(runs: Sequence[Row]) -> str:
-    """One row a fault, one column for when it begins: how many runs succeed, how the others end, who stopped them after how long."""
+    """Format one row a fault, one column for each time of its onset: the number of runs that
+    succeed, the ends of the others, and what stopped them after which time."""
     cells: dict[str, dict[str, list[Row]]] = {}
     for run in runs:
         cells.setdefault(run["fault"], {}).setdefault(run["task"], []).append(run)
@@ -51,7 +53,8 @@ def fault_table(runs: Sequence[Row]) -> str:
 
 
 def _fault_cell(runs: Sequence[Row]) -> str:
-    """How the runs of one fault end, such as ``2 succeed, 3 fall; tilt after 0.41 s; 4 warned: torque after 0.1 s``."""
+    """Summarise the runs of one fault, such as ``2 succeed, 3 fall; tilt after 0.41 s; 4 warned:
+    torque after 0.1 s``."""
     ends = {"succeed": 0, "fall": 0, "stop": 0, "fail": 0}
     stops: dict[str, list[float]] = {}
     warned: dict[str, list[float]] = {}

@@ -94,7 +94,7 @@ blocks:
 
 
 def console(width: int) -> Console:
-    """A console that remembers what is printed and shows nothing."""
+    """Return a console that remembers what is printed and shows nothing."""
     return Console(record=True, width=width, file=io.StringIO(), highlight=False)
 
 
@@ -104,7 +104,7 @@ def save(out: Console, name: str, title: str) -> None:
 
 
 def save_view(recording: Path, instant: float, path: Path) -> None:
-    """What `aloft view` shows of a recording at an instant [s]."""
+    """Draw the view that `aloft view` gives of a recording at an instant [s]."""
     from rerun.experimental import ViewerClient
 
     drawn = write_view(recording.with_name("view.rrd"), read(recording))
@@ -137,7 +137,8 @@ def save_film(path: Path) -> None:
 
 
 def save_drawn(drawn: Sequence[Sequence[str]], folder: Path) -> None:
-    """The pictures of a table such as ``GALLERY``, each by the program: what it runs, then how it shows that."""
+    """Draw the pictures of a table such as ``GALLERY``, each by the program: the one to run, then
+    the one that shows its result."""
     with tempfile.TemporaryDirectory() as made:
         for name, graphs, *shown in drawn:
             files = [str(FOLDER / graph) for graph in graphs.split()]
@@ -192,8 +193,8 @@ def main() -> None:
 
 
 def save_live_page(picture: Path, paused_at: int | None = None) -> None:
-    """A photograph of the page of a graph while it runs, with its parameters, or while it is paused before
-    the tick ``paused_at``, from which it has gone back a little."""
+    """Photograph the page of a graph while it runs, with its parameters, or while it is paused
+    before the tick ``paused_at``, from which it has gone back a little."""
     program = shutil.which("chromium") or shutil.which("google-chrome")
     if program is None:
         print(f"warning: {picture} is the old one: there is no Chromium")
@@ -234,7 +235,7 @@ def _stand(live: LiveRun) -> None:
 
 
 def _live(name: str) -> LiveRun:
-    """The run of that name, once it has begun."""
+    """Return the run of that name, once it has begun."""
     end = time.monotonic() + PATIENCE
     while True:
         try:

@@ -32,7 +32,7 @@ class Example(NamedTuple):
 
 
 def examples(page: str) -> Iterator[Example]:
-    """The sections of the gallery's page, in its order."""
+    """Yield the sections of the gallery's page, in its order."""
     for section in page.split("\n## ")[1:]:
         title, _, rest = section.partition("\n")
         text, marked, rest = rest.partition("<!-- from: ")
@@ -50,7 +50,8 @@ def examples(page: str) -> Iterator[Example]:
 
 
 def cell_of(command: str, recorded: bool = False) -> dict[str, Any]:
-    """A cell that does what a command of the page does; ``recorded``: later ones read the recording of a run."""
+    """Return a cell that does the same as a command of the page; ``recorded``: later ones read the
+    recording of a run."""
     words = shlex.split(command, comments=True)
     words = [w.replace("graphs/", "aloft:").removesuffix(".yaml") if w.startswith("graphs/") else w
              for w in words]  # fmt: skip
@@ -71,19 +72,19 @@ def cell_of(command: str, recorded: bool = False) -> dict[str, Any]:
 
 
 def markdown(text: str) -> dict[str, Any]:
-    """A cell of text."""
+    """Return a cell of text."""
     return {"cell_type": "markdown", "metadata": {}, "source": text}
 
 
 def code(text: str) -> dict[str, Any]:
-    """A cell that was not run yet."""
+    """Return a cell that was not run yet."""
     return {
         "cell_type": "code", "metadata": {}, "source": text, "outputs": [], "execution_count": None,
     }  # fmt: skip
 
 
 def notebook(example: Example) -> dict[str, Any]:
-    """The notebook of an example, in nbformat 4.5."""
+    """Return the notebook of an example, in nbformat 4.5."""
     text = re.sub(
         r"\[([^\]]+)\]\((?!http)[^)]+\)", r"*\1*", example.text
     )  # pages that are not here

@@ -79,17 +79,17 @@ def refresh(page: Path, mark: str, text: str, of: str = "") -> None:
 
 
 def read_json(path: Path) -> Any:
-    """What a command has written."""
+    """Read a file that a command has written."""
     return json.loads(path.read_text(encoding="utf-8"))
 
 
 def write_agreement(file: Path) -> None:
-    """How far the methods of the whole-body controller agree."""
+    """Write the agreement of the methods of the whole-body controller."""
     refresh(DOCS / "whole_body.md", "agreement", agreement_table(read_json(file)))
 
 
 def write_comparisons(*folders: Path) -> None:
-    """The comparisons with other methods, and their pictures."""
+    """Write the comparisons with other methods, and their pictures."""
     page = DOCS / "comparisons.md"
     for folder in folders:
         found = read_json(folder / "summary.json")
@@ -103,7 +103,8 @@ EXCERPT = re.compile(r"(<!-- from: (\S+) -->\n```\w+\n)(.*?)(```)", re.DOTALL)
 
 
 def refreshed_excerpt(match: re.Match[str]) -> str:
-    """The excerpt as the file has it now. It stays what lies between its first and its last line.
+    """Return the excerpt as the file has it now. It stays what lies between its first and its last
+    line.
 
     Raises:
         ValueError: its first or its last line is gone.
@@ -116,18 +117,19 @@ def refreshed_excerpt(match: re.Match[str]) -> str:
 
 
 def write_excerpts() -> None:
-    """README's excerpts of files; tests/test_docs.py finds one that has fallen behind."""
+    """Write README's excerpts of files; tests/test_docs.py finds one that has fallen behind."""
     text = README.read_text(encoding="utf-8")
     README.write_text(EXCERPT.sub(refreshed_excerpt, text), encoding="utf-8")
 
 
 def write_faults(file: Path) -> None:
-    """What faults do to BRUCE, by when they begin."""
+    """Write the effects of faults on BRUCE, by the time of their onset."""
     refresh(DOCS / "analysis.md", "faults", fault_table(_runs_of([file])))
 
 
 def write_frontier(folder: Path) -> None:
-    """How far jumps reach, the picture of it, and what other robots' reach is drawn beside."""
+    """Write the reach of jumps, with its picture, and the data beside which other robots' reach is
+    drawn."""
     found = read_json(folder / "frontier.json")
     refresh(DOCS / "frontier.md", "frontier", frontier_table(found))
     text = json.dumps(beside(found, find_robot("bruce")), indent=1) + "\n"
@@ -136,7 +138,7 @@ def write_frontier(folder: Path) -> None:
 
 
 def write_landing(*files: Path) -> None:
-    """Where the landing laws place the feet after a push: two studies."""
+    """Write where the landing laws place the feet after a push: two studies."""
     for mark, file in zip(("", " 12 cm"), files, strict=False):
         rows = read_json(file)["rows"]
         for name, made in (
@@ -146,7 +148,8 @@ def write_landing(*files: Path) -> None:
 
 
 def write_results() -> None:
-    """The standard trial's reported seeds, which are run for it, and README's sentence."""
+    """Write the results of the standard trial's reported seeds, which are run for it, and README's
+    sentence."""
     rows = list(run_seeds(ROOT / "graphs" / "jump.yaml", [], SEEDS))
     refresh(DOCS / "results.md", "results", results_table(rows))
     refresh(README, "results", results_sentence(rows))
@@ -156,7 +159,8 @@ URDF = "package://example-robot-data/robots/go1_description/urdf/go1.urdf"
 
 
 def printed_of_robots() -> dict[str, str]:
-    """What ``aloft robot`` prints and writes for an example, by what it is called on the page."""
+    """Return the output and the files of ``aloft robot`` for an example, by their names on the
+    page."""
     source = find_file(URDF, Path("/"))
     if source is None:
         raise SystemExit("the package example-robot-data is not installed")
@@ -176,7 +180,7 @@ def printed_of_robots() -> dict[str, str]:
 
 
 def with_printed(page: str, blocks: Mapping[str, str]) -> str:
-    """The page with the blocks behind their marks."""
+    """Return the page with the blocks behind their marks."""
     for name, text in blocks.items():
         pattern = rf"(<!-- printed: {re.escape(name)} -->\n```\w*\n).*?(```\n)"
         page = re.sub(pattern, lambda m, t=text: f"{m[1]}{t}\n{m[2]}", page, flags=re.DOTALL)
@@ -184,7 +188,7 @@ def with_printed(page: str, blocks: Mapping[str, str]) -> str:
 
 
 def write_robots() -> None:
-    """What ``aloft robot`` prints for an example; needs the package example-robot-data."""
+    """Write the output of ``aloft robot`` for an example; needs the package example-robot-data."""
     page = DOCS / "robots.md"
     text = with_printed(page.read_text(encoding="utf-8"), printed_of_robots())
     page.write_text(text, encoding="utf-8")
@@ -194,7 +198,7 @@ TASK_PARAMETERS = "task parameters"
 
 
 def task_parameter_tables() -> str:
-    """The tables of everything a task file may say, from the declarations."""
+    """Return the tables of everything that a task file may say, from the declarations."""
     parts = []
     for title, owner in (
         ("", JumpTask),
@@ -243,65 +247,65 @@ def _bounds(metadata: Sequence[Any]) -> str:
 
 
 def write_task_parameters() -> None:
-    """The parameters of a task."""
+    """Write the parameters of a task."""
     refresh(DOCS / "planning.md", TASK_PARAMETERS, task_parameter_tables())
 
 
 def write_tasks(file: Path) -> None:
-    """The tasks that BRUCE was tried on, and some of them in README."""
+    """Write the tasks that BRUCE was tried on, and some of them in README."""
     summary = read_json(file)
     refresh(DOCS / "results.md", "tasks", tasks_table(summary))
     refresh(README, "tasks", short_tasks_table(summary))
 
 
 def write_robots_results(file: Path) -> None:
-    """The tasks that other robots were tried on."""
+    """Write the tasks that other robots were tried on."""
     refresh(DOCS / "robots_results.md", "tasks", tasks_table(read_json(file)))
 
 
 def write_every_robot(file: Path) -> None:
-    """Every URDF of example-robot-data, read and put on its feet."""
+    """Write every URDF of example-robot-data, read and put on its feet."""
     refresh(DOCS / "robots_results.md", "every robot", every_robot_table(read_json(file)["rows"]))
 
 
 def write_mutated_robots(file: Path) -> None:
-    """What becomes of real descriptions with one thing made wrong."""
+    """Write the outcomes of real descriptions with one mistake each."""
     text = mutated_robots_table(read_json(file)["rows"])
     refresh(DOCS / "robots_results.md", "mutated robots", text)
 
 
 def write_effects(file: Path) -> None:
-    """What each effect of a real robot does to a jump."""
+    """Write the change that each effect of a real robot makes to a jump."""
     refresh(DOCS / "real_robots.md", "effects", effects_table(read_json(file)["rows"]))
 
 
 def write_known_effects(file: Path) -> None:
-    """What each effect does to a jump of a robot that was calibrated with it."""
+    """Write the change that each effect makes to a jump of a robot that was calibrated with it."""
     refresh(DOCS / "real_robots.md", "known effects", effects_table(read_json(file)["rows"]))
 
 
 def write_real(file: Path) -> None:
-    """Robots as a bench finds them, untold, calibrated, and learning."""
+    """Write robots as a bench finds them, untold, calibrated, and learning."""
     refresh(DOCS / "real_robots.md", "real", real_table(read_json(file)["robots"]))
 
 
 def write_ground(*files: Path) -> None:
-    """Landings on single unevennesses that nobody is told of."""
+    """Write landings on single unevennesses that are unknown to the controller."""
     refresh(DOCS / "ground.md", "ground", ground_table(_runs_of(files), "ground"))
 
 
 def write_uneven(*files: Path) -> None:
-    """Jumps in the trial ``uneven``."""
+    """Write jumps in the trial ``uneven``."""
     refresh(DOCS / "ground.md", "uneven", ground_table(_runs_of(files), "task"))
 
 
 def write_slopes(*files: Path) -> None:
-    """Landings on slopes, untold and told."""
+    """Write landings on slopes, untold and told."""
     refresh(DOCS / "ground.md", "slopes", ground_table(_runs_of(files), "ground"))
 
 
 def _runs_of(files: Sequence[Path]) -> list[dict[str, Any]]:
-    """All runs of studies, of which ``files`` are the summaries."""
+    """Read all runs of studies, of which ``files`` are the summaries."""
     from pyarrow import parquet
 
     return [
@@ -311,17 +315,17 @@ def _runs_of(files: Sequence[Path]) -> list[dict[str, Any]]:
 
 
 def write_late(file: Path) -> None:
-    """Late sensors, told and not told."""
+    """Write late sensors, told and not told."""
     refresh(DOCS / "real_robots.md", "late", effects_table(read_json(file)["rows"]))
 
 
 def write_export(file: Path) -> None:
-    """How long a tick of the exported library takes."""
+    """Write the duration of a tick of the exported library."""
     refresh(DOCS / "c_library.md", "export", ratio_table(read_json(file)))
 
 
 def write_tick(file: Path) -> None:
-    """How long a tick takes, with a picture, and some of it in README."""
+    """Write the duration of a tick, with a picture, and some of it in README."""
     found = read_json(file)
     refresh(DOCS / "compiled.md", "tick", tick_tables(found))
     refresh(README, "tick", short_tick_table(found))
@@ -329,7 +333,8 @@ def write_tick(file: Path) -> None:
 
 
 def write_twin(file: Path) -> None:
-    """The twin beside the simulation; ``runs.parquet`` beside the summary says which seeds differ."""
+    """Write the twin beside the simulation; ``runs.parquet`` beside the summary says which seeds
+    differ."""
     from pyarrow import parquet
 
     runs = parquet.read_table(file.with_name("runs.parquet")).to_pylist()
@@ -383,7 +388,7 @@ PAGES = {
 
 
 def usage() -> str:
-    """All pages, and how each is made."""
+    """List all pages, and the command that makes each."""
     lines = []
     for name, page in PAGES.items():
         lines.append(f"{name}: {page.write.__doc__}")

@@ -16,7 +16,7 @@ Row = Mapping[str, Any]
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table in Markdown."""
+    """Format a table in Markdown."""
     return "".join(map(_line, [head, ["---"] * len(head), *rows]))
 
 
@@ -27,17 +27,17 @@ def _line(cells: Sequence[str]) -> str:
 
 
 def percent(share: float) -> str:
-    """A share as whole percents."""
+    """Format a share as whole percents."""
     return f"{100.0 * share:.0f} %"
 
 
 def interval(row: Row) -> str:
-    """The interval of a row's success rate."""
+    """Format the interval of a row's success rate."""
     return f"{percent(row['ci_low'])} to {percent(row['ci_high'])}"
 
 
 def succeeded(row: Row) -> str:
-    """How many runs of a row succeeded."""
+    """Format the number of a row's runs that succeeded."""
     return f"{row['successes']} of {row['n']}"
 
 
@@ -45,7 +45,8 @@ AGREEMENT_HEAD = ("programs", "method", "largest error of a torque [N m]", "not 
 
 
 def agreement_table(found: Row) -> str:
-    """A line for every method and set of programs: the largest error, and how many were not solved."""
+    """Format a line for every method and set of programs: the largest error, and the number left
+    unsolved."""
     lines = []
     rows = {row["name"]: row for row in found["rows"]}
     for name, row in rows.items():
@@ -77,11 +78,12 @@ BASE: tuple[Column, ...] = (
 COLUMNS = {"formulations": JUMP, "controller": JUMP, "estimator": BASE}
 """The metrics that a study's table shows."""
 AXES = ("jump", "task", "arm")
-"""What tells the rows of a table apart, where it does."""
+"""Axes that distinguish the rows of a table, where they differ."""
 
 
 def comparison_table(summary: Row) -> str:
-    """One row a cell: how many runs succeeded and fell, and medians with their 5 % and 95 %."""
+    """Format one row a cell: the numbers of runs that succeeded and fell, and medians with their 5
+    % and 95 %."""
     rows, columns = summary["rows"], COLUMNS[summary["study"]]
     axes = [axis for axis in AXES if len({row.get(axis) for row in rows}) > 1]
     rows = sorted(rows, key=lambda row: [_place(rows, axis, row) for axis in axes])
@@ -96,12 +98,12 @@ def comparison_table(summary: Row) -> str:
 
 
 def _place(rows: Sequence[Row], axis: str, row: Row) -> int:
-    """Where the study has the row's value on an axis."""
+    """Return the index of the row's value on an axis of the study."""
     return list(dict.fromkeys(other[axis] for other in rows)).index(row[axis])
 
 
 def _figures(row: Row, metric: str, less: str, factor: float) -> str:
-    """Median and the two quantiles; how many runs have them where not all do."""
+    """Format median and the two quantiles, with the number of runs that have them where not all do."""
     metrics = row["metrics"]
     if metric not in metrics:
         return "-"
@@ -121,7 +123,7 @@ FRONTIER_HEAD = (
 
 
 def frontier_table(found: Row) -> str:
-    """What was run, and one row a direction."""
+    """Format the conditions of the measurement, and one row a direction."""
     seeds = found["seeds"]
     return (
         f"{len(seeds)} seeds a value, {seeds[0]} to {seeds[-1]}.\n\n"
@@ -159,23 +161,23 @@ SHIPPED = "predicted"
 
 
 def values_of(rows: Sequence[Row], name: str) -> list[Any]:
-    """The values that a study has of something, in its order."""
+    """Return the values that a study has of something, in its order."""
     return list(dict.fromkeys(row[name] for row in rows))
 
 
 def rate(successes: float, runs: float) -> str:
-    """A success rate in percent, or a dash where nothing was run."""
+    """Format a success rate in percent, or a dash where nothing was run."""
     return percent(successes / runs) if runs else "-"
 
 
 def count(rows: Sequence[Row], **wanted: object) -> tuple[int, int]:
-    """Successes and runs of the rows with these values."""
+    """Count successes and runs of the rows with these values."""
     mine = [row for row in rows if all(row[name] == value for name, value in wanted.items())]
     return sum(row["successes"] for row in mine), sum(row["n"] for row in mine)
 
 
 def impulse_table(rows: Sequence[Row]) -> str:
-    """Success over all directions, a line an arm, a column an impulse."""
+    """Format success over all directions, a line an arm, a column an impulse."""
     impulses = values_of(rows, "impulse_n_s")
     lines = []
     for arm in values_of(rows, "arm"):
@@ -186,7 +188,7 @@ def impulse_table(rows: Sequence[Row]) -> str:
 
 
 def quarter_table(rows: Sequence[Row]) -> str:
-    """Success over all impulses, a column a quarter of the directions."""
+    """Format success over all impulses, a column a quarter of the directions."""
     lines = []
     for arm in values_of(rows, "arm"):
         cells = []
@@ -203,7 +205,7 @@ def quarter_table(rows: Sequence[Row]) -> str:
 
 
 def direction_table(rows: Sequence[Row]) -> str:
-    """The shipped law's and the best other arm's successes, a line a direction."""
+    """Format the shipped law's and the best other arm's successes, a line a direction."""
     impulses = values_of(rows, "impulse_n_s")
     others = [arm for arm in values_of(rows, "arm") if arm != SHIPPED]
     lines = []
@@ -236,7 +238,7 @@ FIGURES = (
 
 
 def results_table(rows: Sequence[SeedRow]) -> str:
-    """The table of least, median and greatest over the seeds."""
+    """Format the table of least, median and greatest over the seeds."""
     lines = []
     for name, text, scale, unit, goal in FIGURES:
         values = [row.metrics[name] * scale for row in rows if name in row.metrics]
@@ -250,7 +252,7 @@ def results_table(rows: Sequence[SeedRow]) -> str:
 
 
 def results_sentence(rows: Sequence[SeedRow]) -> str:
-    """How many seeds succeeded, and the median of the first figure."""
+    """Format the number of seeds that succeeded, and the median of the first figure."""
     name, text, scale, unit, goal = FIGURES[0]
     middle = median(row.metrics[name] * scale for row in rows if name in row.metrics)
     return (
@@ -280,12 +282,12 @@ TASKS_HEAD = ("task", "succeeded", "95 % interval", "goal")
 
 
 def tasks_table(summary: Row) -> str:
-    """One row a task: how many of its runs succeeded, and between which rates that lies."""
+    """Format one row a task: the number of its runs that succeeded, and the interval of the rate."""
     return table(TASKS_HEAD, map(_task, summary["rows"]))
 
 
 def every_robot_table(rows: Sequence[Row]) -> str:
-    """One row a file: its joints, and what became of it."""
+    """Format one row a file: its joints, and the outcome."""
     return table(
         ("file", "joints", "what became of it"),
         (
@@ -296,7 +298,8 @@ def every_robot_table(rows: Sequence[Row]) -> str:
 
 
 def mutated_robots_table(rows: Sequence[Row]) -> str:
-    """One row a kind of mistake, with what became of its cases in each format; none where a format has no such kind.
+    """Format one row a kind of mistake, with the outcomes of its cases in each format; none where a
+    format has no such kind.
 
     The rows are those of ``aloft bench mutated_robots``, called ``FORMAT: KIND``.
     """
@@ -318,7 +321,8 @@ def mutated_robots_table(rows: Sequence[Row]) -> str:
 
 
 def short_tasks_table(summary: Row) -> str:
-    """How many tasks met their goal, the rows of ``README_TASKS``, and those of all that did not.
+    """Format the number of tasks that met their goal, the rows of ``README_TASKS``, and those of
+    all that did not.
 
     Raises:
         ValueError: the summary lacks a task of ``README_TASKS``.
@@ -352,7 +356,8 @@ REACHED, FLOOR, MISSED = "goal reached", "floor reached", "missed"
 
 
 def tick_tables(found: Row) -> str:
-    """What was measured, the picture, and two tables: of blocks, and of ratios."""
+    """Format the conditions of the measurement, the picture, and two tables: of blocks, and of
+    ratios."""
     rows: Sequence[Row] = found["rows"]
     blocks = {prefix: _blocks(rows, prefix) for prefix, _ in BARS}
     shown = [(prefix, label) for prefix, label in BARS if blocks[prefix]]
@@ -371,7 +376,7 @@ def tick_tables(found: Row) -> str:
 
 
 def ratio_table(found: Row) -> str:
-    """What was measured, and one row each."""
+    """Format the conditions of the measurement, and one row each."""
     return f"{_circumstances(found)}\n\n" + table(TICK_HEAD, map(_ratio, found["rows"]))
 
 
@@ -412,7 +417,8 @@ def _outcome(row: Row) -> str:
 
 
 def short_tick_table(found: Row) -> str:
-    """The picture, how many goals are reached, the rows of ``README_TICK``, and all missed ones."""
+    """Format the picture, the number of goals reached, the rows of ``README_TICK``, and all missed
+    ones."""
     rows = [row for row in found["rows"] if row["goal"] is not None]
     outcomes = [_outcome(row) for row in rows]
     shown = [
@@ -440,7 +446,7 @@ Pair = tuple[Row, Row]
 
 
 def pairs_of(runs: Sequence[Row]) -> dict[str, list[Pair]]:
-    """For each task the runs of both arms with the same seed, by seed."""
+    """Return for each task the runs of both arms with the same seed, by seed."""
     found: dict[str, dict[int, dict[str, Row]]] = {}
     for run in runs:
         found.setdefault(run["task"], {}).setdefault(run["seed"], {})[run["arm"]] = run
@@ -451,7 +457,8 @@ def pairs_of(runs: Sequence[Row]) -> dict[str, list[Pair]]:
 
 
 def twin_table(rows: Sequence[Row], runs: Sequence[Row]) -> str:
-    """One row a task that both arms ran, the runs that differ, and what all of them say together."""
+    """Format one row a task that both arms ran, the runs that differ, and the verdict over all of
+    them."""
     by_task: dict[str, dict[str, Row]] = {}
     for row in rows:
         by_task.setdefault(row["task"], {})[row["arm"]] = row
@@ -468,7 +475,7 @@ def twin_table(rows: Sequence[Row], runs: Sequence[Row]) -> str:
 
 
 def effects_table(rows: Sequence[Row]) -> str:
-    """One row an effect, one column a task."""
+    """Format one row an effect, one column a task."""
     tasks = list(dict.fromkeys(row["task"] for row in rows))
     by_effect: dict[str, dict[str, Row]] = {}
     for row in rows:
@@ -480,7 +487,8 @@ def effects_table(rows: Sequence[Row]) -> str:
 
 
 def real_table(robots: Sequence[Mapping[str, Any]]) -> str:
-    """One row a kind of jump, one column an arm: how many robots land, at each time."""
+    """Format one row a kind of jump, one column an arm: the number of robots that land, at each
+    time."""
     arms = list(robots[0]["arms"])
     rows = []
     for kind in robots[0]["arms"][arms[0]]:
@@ -497,19 +505,19 @@ def real_table(robots: Sequence[Mapping[str, Any]]) -> str:
 
 
 def equally_likely(first: int, second: int) -> float:
-    """The probability of a split at least as uneven as ``first`` to ``second`` between two sides that
-    are equally likely: McNemar's exact test, on both sides."""
+    """Compute the probability of a split at least as uneven as ``first`` to ``second`` between two
+    sides that are equally likely: McNemar's exact test, on both sides."""
     n, least = first + second, min(first, second)
     return min(1.0, 2.0 * math.fsum(math.comb(n, k) for k in range(least + 1)) / 2.0**n)
 
 
 def _unlike(pairs: Sequence[Pair]) -> list[Pair]:
-    """The pairs of which one run succeeded."""
+    """Return the pairs of which one run succeeded."""
     return [pair for pair in pairs if pair[0]["success"] != pair[1]["success"]]
 
 
 def _verdict(pairs: Mapping[str, Sequence[Pair]]) -> str:
-    """The runs that differ, each with its reason, and McNemar's test over all pairs."""
+    """Return the runs that differ, each with its reason, and McNemar's test over all pairs."""
     every = [pair for group in pairs.values() for pair in group]
     if not every:
         raise ValueError("no task was run by both arms with the same seed")
@@ -543,6 +551,7 @@ def _mean(row: Row, name: str, scale: float, unit: str) -> str:
 
 
 def _highest(pairs: Sequence[Pair], arm: int) -> str:
-    """Over the runs that succeeded: a robot that has fallen says nothing about the others."""
+    """Format the highest value over the runs that succeeded: a robot that has fallen says nothing
+    about the others."""
     values = [pair[arm][TILT] for pair in pairs if pair[arm]["success"] and pair[arm].get(TILT)]
     return f"{max(values):.0f} deg" if values else "-"

@@ -32,7 +32,7 @@ _PLAIN = re.compile(
     r"|(?P<float>[-+]?(?:[0-9][0-9_]*(?:\.[0-9_]*)?|\.[0-9][0-9_]*)(?:[eE][-+]?[0-9]+)?"
     r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$"
 )
-"""What a scalar without quotes and tag is in YAML 1.2; all others are texts."""
+"""Pattern of a plain YAML 1.2 scalar (null, bool, number); any other unquoted scalar is a text."""
 _FIRST = frozenset("-+0123456789.~nNtTfF")
 """The first characters of what ``_PLAIN`` matches, as most scalars are texts."""
 
@@ -48,7 +48,7 @@ def read_file(
     *,
     may_be_empty: bool = False,
 ) -> MapNode | None:
-    """The mapping in a file, which messages call ``shown``; ``None`` after a problem.
+    """Return the mapping in a file, which messages call ``shown``; ``None`` after a problem.
 
     ``kind_of_file`` holds two texts for messages: the name of such a file and some of its keys.
     """
@@ -94,7 +94,7 @@ def read_mapping(
     *,
     may_be_empty: bool = False,
 ) -> MapNode | None:
-    """The mapping in a YAML text; ``None`` after a problem."""
+    """Return the mapping in a YAML text; ``None`` after a problem."""
     before = len(problems)
     node = read_value(text, shown, problems)
     if isinstance(node, MapNode):
@@ -116,7 +116,7 @@ def read_mapping(
 
 
 def read_value(text: str, shown: str, problems: Problems) -> Node | None:
-    """The one value in a YAML text; ``None`` for an empty text and after a problem."""
+    """Return the one value in a YAML text; ``None`` for an empty text and after a problem."""
     node, found = _read(text, shown)
     problems.extend(found)
     return node
@@ -124,7 +124,7 @@ def read_value(text: str, shown: str, problems: Problems) -> Node | None:
 
 @lru_cache(maxsize=64)  # studies and tests load graphs that share most of their files many times
 def _read(text: str, shown: str) -> tuple[Node | None, Problems]:
-    """The value in a YAML text, and what is wrong with it."""
+    """Return the value in a YAML text, and the problems of the text."""
     node, problems = None, Problems()
     try:
         loader = _Loader(_hide_brackets(text))
@@ -187,7 +187,7 @@ _SHOWN = str.maketrans("\ue000\ue001\ue002", "[],")
 
 
 def _hide_brackets(text: str) -> str:
-    """The text with the brackets behind ``block.port`` hidden from YAML."""
+    """Return the text with the brackets behind ``block.port`` hidden from YAML."""
     if "[" not in text:
         return text
     return _SOURCE.sub(lambda match: match[0].translate(_HIDDEN), text)
@@ -208,7 +208,7 @@ class _Composer:
         self.depth = 0
 
     def compose(self) -> Node | None:
-        """The only document's node."""
+        """Return the only document's node."""
         self.loader.get_event()  # the stream's start
         if self.loader.check_event(yaml.StreamEndEvent):
             return None

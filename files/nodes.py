@@ -11,7 +11,7 @@ from typing import Any
 from .problems import Position
 
 Plain = None | bool | int | float | str
-"""What a scalar may be."""
+"""Plain value of a scalar."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class MapNode:
         return iter(self.entries)
 
     def get(self, key: str) -> Entry | None:
-        """The entry of a key."""
+        """Return the entry of a key."""
         for entry in self.entries:
             if entry.key == key:
                 return entry
@@ -61,7 +61,7 @@ class MapNode:
         return tuple(entry.key for entry in self.entries)
 
     def assign(self, path: Sequence[str], value: Node, key_where: Position) -> MapNode:
-        """A copy with the value at ``path`` set; mappings on the way are made where missing.
+        """Return a copy with the value at ``path`` set; mappings on the way are made where missing.
 
         Where a YAML file is named on the way, ``task: tasks/hop.yaml``, the value is a change of
         what is in that file: ``task: {file: tasks/hop.yaml, rise: 12 cm}``.
@@ -84,14 +84,15 @@ FILE_KEY = "file"
 
 
 def _inside(node: Node) -> MapNode | None:
-    """The mapping that a value set inside ``node`` goes into; ``None`` if nothing of it stays."""
+    """Return the mapping that a value set inside ``node`` goes into; ``None`` if nothing of it
+    stays."""
     if isinstance(node, ScalarNode) and str(node.value).endswith((".yaml", ".yml")):
         return MapNode((Entry(FILE_KEY, node.where, node),), node.where)
     return node if isinstance(node, MapNode) else None
 
 
 def plain(node: Node) -> Any:
-    """The tree as plain Python data, without places."""
+    """Return the tree as plain Python data, without places."""
     if isinstance(node, ScalarNode):
         return node.value
     if isinstance(node, ListNode):
@@ -110,7 +111,8 @@ def texts_of(node: Node) -> Iterator[str]:
 
 
 def from_plain(value: Any, where: Position) -> Node:
-    """A tree of plain Python data (also NumPy arrays and scalars), all of it at one place."""
+    """Return a tree of plain Python data (also NumPy arrays and scalars), all of it at one
+    place."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, Mapping):
@@ -124,12 +126,12 @@ def from_plain(value: Any, where: Position) -> Node:
 
 
 def move(node: Node, where: Position) -> Node:
-    """The same tree with every place replaced by ``where``."""
+    """Return the same tree with every place replaced by ``where``."""
     return from_plain(plain(node), where)
 
 
 def kind(node: Node) -> str:
-    """What the value is, in words, for messages."""
+    """Describe the type of a value in words, for messages."""
     if isinstance(node, MapNode):
         return "a mapping"
     if isinstance(node, ListNode):

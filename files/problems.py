@@ -102,7 +102,7 @@ class Problem:
     fix: str = ""
 
     def lines(self) -> list[tuple[str, str]]:
-        """The details under the headline, as (label, text)."""
+        """Return the details under the headline, as (label, text)."""
         other = self.other
         if self.other_where is not None:
             other = f"{other} at {self.other_where}" if other else str(self.other_where)
@@ -117,12 +117,12 @@ class Problem:
         return [(label, text) for label, text in rows if text]
 
     def text(self) -> str:
-        """The problem as plain text of several lines."""
+        """Return the problem as plain text of several lines."""
         head = f"{self.where}: {self.code}: {self.message}"
         return "\n".join([head, *(f"    {label:<9}  {text}" for label, text in self.lines())])
 
     def as_json(self) -> dict[str, Any]:
-        """The problem as plain data."""
+        """Return the problem as plain data."""
         return {
             "code": str(self.code),
             "message": self.message,
@@ -154,7 +154,7 @@ class Report:
 
     @property
     def ok(self) -> bool:
-        """Whether there is no problem."""
+        """True if there is no problem."""
         return not self.problems
 
     def headline(self) -> str:
@@ -163,7 +163,8 @@ class Report:
         return f"{self.file}: {count or 'no'} problem{'s' if count != 1 else ''}"
 
     def printed(self) -> tuple[list[Problem], list[str]]:
-        """The problems to print, the first ``MOST_SHOWN`` of each kind, and a line on the others."""
+        """Return the problems to print, the first ``MOST_SHOWN`` of each kind, and a line on the
+        others."""
         counts: dict[Code, int] = {}
         printed_problems = []
         for problem in self.problems:
@@ -178,12 +179,12 @@ class Report:
         return printed_problems, more
 
     def text(self) -> str:
-        """The report as plain text; of very many problems of one kind the first ones."""
+        """Return the report as plain text; of very many problems of one kind the first ones."""
         printed_problems, more = self.printed()
         return "\n\n".join([*(p.text() for p in printed_problems), *more, self.headline()])
 
     def rich(self) -> Text:
-        """The whole report for a terminal, in colour."""
+        """Return the whole report for a terminal, in colour."""
         from rich.text import Text
 
         styles = {"expected": "green", "found": "red", "nearest": "cyan", "fix": "bold green"}
@@ -203,7 +204,7 @@ class Report:
         return out
 
     def as_json(self) -> dict[str, Any]:
-        """The report as plain data: ``file``, ``ok``, ``count``, ``problems``."""
+        """Return the report as plain data: ``file``, ``ok``, ``count``, ``problems``."""
         return {
             "file": self.file,
             "ok": self.ok,
@@ -246,14 +247,14 @@ class Problems:
         Where a place has a syntax error, its other problems follow from that and are left out.
         """
         unread = {p.where: p for p in self._found if p.code in _UNREADABLE}
-        printed_problems = [p for p in self._found if unread.get(p.where, p) is p]
-        return Report(file, tuple(sorted(printed_problems, key=lambda problem: problem.where)))
+        kept = [p for p in self._found if unread.get(p.where, p) is p]
+        return Report(file, tuple(sorted(kept, key=lambda problem: problem.where)))
 
 
 def nearest(
     name: str, legal: Iterable[str], count: int = 3, cutoff: float = 0.6
 ) -> tuple[str, ...]:
-    """The legal names most similar to ``name``, the most similar first; empty if none is.
+    """Return the legal names most similar to ``name``, the most similar first; empty if none is.
 
     Names less similar than ``cutoff``, which is from 0 to 1, are left out.
     """
@@ -266,7 +267,8 @@ def nearest(
 
 
 def fix_for_key(key: str, value: str, where: Position, right: str) -> str:
-    """The fix to paste for a misspelt key: the corrected override, or the key with its value."""
+    """Return the fix to paste for a misspelt key: the corrected override, or the key with its
+    value."""
     if not where.line:
         start, dot, rest = where.file.rpartition(f".{key}")
         return f"{start}.{right}{rest}" if dot else where.file

@@ -1,4 +1,5 @@
-"""Reads files into pydantic models; what pydantic refuses is told in the words of the file, each mistake once, at its place."""
+"""Reads files into pydantic models; reports what pydantic refuses in the words of the file, each
+mistake once, at its place."""
 
 from __future__ import annotations
 
@@ -49,7 +50,8 @@ def read_model(
     *,
     may_be_empty: bool = False,
 ) -> tuple[Model | None, MapNode | None]:
-    """The model in a file, and the file's tree; ``None`` for what cannot be read, which is reported.
+    """Return the model in a file, and the file's tree; ``None`` for what cannot be read, which is
+    reported.
 
     ``kind_of_file`` holds two texts for messages: the name of such a file and some of its keys.
     """
@@ -65,7 +67,8 @@ def read_model(
 
 
 def explain(error: Mapping[str, Any], unit: str = "") -> tuple[str, str]:
-    """What was expected where pydantic reports an error, and a reason where there is more to say."""
+    """Return what was expected where pydantic reports an error, and the reason if there is more to
+    it."""
     kind = str(error["type"])
     context = error.get("ctx", {})
     if kind in _BOUNDS:
@@ -111,14 +114,14 @@ def describe(error: Mapping[str, Any], model: type[BaseModel]) -> str:
 
 
 def with_unit(expected: str, unit: str) -> str:
-    """What is expected, with the unit where it does not say it already."""
+    """Return the expectation with the unit, where its text does not contain the unit already."""
     if not unit or not expected or re.search(rf"(?<!\w){re.escape(unit)}(?!\w)", expected):
         return expected
     return f"{expected} in {unit}"
 
 
 def unit_of(info: FieldInfo | None) -> str:
-    """The unit that a field of a model was declared with, as text."""
+    """Return the unit that a field of a model was declared with, as text."""
     extra = info.json_schema_extra if info is not None else None
     return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
 
@@ -130,7 +133,7 @@ def path_text(path: Sequence[str | int]) -> str:
 
 
 def info_at(model: type[BaseModel], location: Sequence[str | int]) -> FieldInfo | None:
-    """The field that a location lies in, or the innermost one that is known."""
+    """Return the field that a location lies in, or the innermost one that is known."""
     found: FieldInfo | None = None
     for depth, key in enumerate(location):
         for owner in _models_at(model, location[:depth]):
@@ -139,13 +142,13 @@ def info_at(model: type[BaseModel], location: Sequence[str | int]) -> FieldInfo 
 
 
 def names_at(model: type[BaseModel], location: Sequence[str | int]) -> tuple[str, ...]:
-    """The keys that are legal in the mapping at a location."""
+    """Return the keys that are legal in the mapping at a location."""
     names = [name for owner in _models_at(model, location) for name in owner.model_fields]
     return tuple(dict.fromkeys(names))
 
 
 def _models_at(model: type[BaseModel], location: Sequence[str | int]) -> list[type[BaseModel]]:
-    """The models that may stand at a location, which may also name members of unions."""
+    """Return the models that may stand at a location, which may also name members of unions."""
     types: list[Any] = [model]
     for key in location:
         types = _models(types)
@@ -162,7 +165,7 @@ def _models_at(model: type[BaseModel], location: Sequence[str | int]) -> list[ty
 
 
 def _models(types: Iterable[Any]) -> list[Any]:
-    """The types with the members of unions in place of the unions."""
+    """Return the types with the members of unions in place of the unions."""
     found: list[Any] = []
     for each in types:
         if get_origin(each) is Annotated:
@@ -189,7 +192,7 @@ class Mistake:
     nearest: tuple[str, ...] = ()
     fix: str = ""
     location: Path_ = ()
-    """Where pydantic says it is, which also names the members of unions."""
+    """Location that pydantic reports, in which members of unions also appear."""
     kinds: list[str] = field(default_factory=list)
     """Pydantic's names for the errors."""
 
@@ -230,7 +233,7 @@ class Mistake:
 
 
 def find_mistakes(error: ValidationError, model: type[BaseModel], tree: MapNode) -> list[Mistake]:
-    """What pydantic refused of a tree, each mistake once and without what only follows from another."""
+    """Return the mistakes that pydantic found in a tree, each once and without its consequences."""
     found: dict[tuple[Code, Path_], Mistake] = {}
     for each in error.errors(include_url=False):
         mistake = _mistake(each, model, tree)
@@ -308,16 +311,16 @@ def locate(root: MapNode, location: Sequence[str | int]) -> tuple[Path_, Node, E
     return tuple(steps), node, entry
 
 
-def place_of(root: MapNode, path: Sequence[str | int]) -> Position:
-    """The place of the value at a path, or of the nearest thing that holds it."""
+def location_of(root: MapNode, path: Sequence[str | int]) -> Position:
+    """Return the place of the value at a path, or of the nearest thing that holds it."""
     return locate(root, path)[1].where
 
 
 def _is_explained(mistake: Mistake, others: Iterable[Mistake]) -> bool:
-    """Whether a collection was refused only because of elements that other mistakes are about.
+    """Return whether a collection was refused only because of elements that other mistakes report.
 
     Where the type is a number or a mapping, pydantic reports the wrong element of a mapping, and
-    also that the mapping is not a number; the latter says nothing new.
+    also that the mapping is not a number; the latter adds nothing.
     """
     depth = len(mistake.path)
     return isinstance(mistake.node, (MapNode, ListNode)) and any(
@@ -326,7 +329,7 @@ def _is_explained(mistake: Mistake, others: Iterable[Mistake]) -> bool:
 
 
 def _is_meant(mistake: Mistake, others: Iterable[Mistake]) -> bool:
-    """Whether a missing key is given under a misspelt name."""
+    """Return whether a missing key is given under a misspelt name."""
     return mistake.code is Code.MISSING_PARAMETER and any(
         other.code is Code.UNKNOWN_PARAMETER
         and other.path[:-1] == mistake.path[:-1]

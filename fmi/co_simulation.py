@@ -259,7 +259,7 @@ def _ports(
 
 
 def _nested(values: list[Any], shape: tuple[int, ...]) -> list[Any]:
-    """Values in row-major order as nested lists of a shape."""
+    """Return values in row-major order as nested lists of a shape."""
     for size in reversed(shape[1:]):
         values = [values[k : k + size] for k in range(0, len(values), size)]
     return values

@@ -138,7 +138,7 @@ def _describe(path: Path, file: str, outputs: tuple[str, ...], *_stamp: int) -> 
 
 
 def _read(path: Path, file: str) -> Any:
-    """FMPy's model description of a file. Raises ``BlockError``."""
+    """Read FMPy's model description of a file. Raises ``BlockError``."""
     try:
         from fmpy.model_description import read_model_description
     except ImportError:
@@ -223,7 +223,7 @@ def _variable(each: Any, units: Mapping[str, Unit | None]) -> Variable:
 
 
 def _in_rows(variables: list[Variable]) -> list[Variable]:
-    """``u[1]``, ``u[2]``, ... of one type and unit as one variable ``u``; others as they are."""
+    """Return ``u[1]``, ``u[2]``, ... of one type and unit as one variable ``u``; others as they are."""
     rows: dict[str, list[Variable]] = {}
     for each in variables:
         match = _ELEMENT.match(each.name)

@@ -69,7 +69,7 @@ class Outside(Block):
         for port, fields in params.ports.items():
             signal = signal_of("FromOutside", fields)
             body[port] = Output(signal, text="what is outside")
-            body[f"kept_{port}"] = State(signal, text="what was set last")
+            body[f"kept_{port}"] = State(signal, text="values that were set last")
         return type("Outside", (Outside,), body)
 
     @classmethod

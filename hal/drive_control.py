@@ -13,7 +13,7 @@ asks for, and the drive's own loop acts on as much of the error as the command's
     phi_goal' = phi' + d (phi_d' - phi')           d: share of its damping
     kappa     = A^-T (tau + Kp (q_d - q) + Kd (q_d' - q')) - s P (phi_d - phi) - d D (phi_d' - phi')
 
-**Motors as they are.** Where ``motor_model`` says how a motor differs from its nominal torque constant, the
+**Motors as they are.** Where by ``motor_model`` a motor differs from its nominal torque constant, the
 driver asks of it the nominal torque r for which it gives the torque t that the joints need::
 
     t = c r (1 - s (r / peak)^2) - f |r| tanh(v / v_0)
@@ -48,9 +48,9 @@ from ..runtime.language.signals import Field, Signal
 from ..runtime.language.steps import signal_call
 
 _REACH = 3.0
-"""How far from its target a joint is [rad] where the default stiffness asks for the peak torque.
-BRUCE's joints get 3.5 N m/rad, as in its maker's own program; stiffer drives hinder a thrust, since
-their goals are as old as a period of the bus."""
+"""Distance of a joint from its target [rad] at which the default stiffness asks for the peak torque. BRUCE's joints get
+3.5 N m/rad, as in its maker's own program; stiffer drives hinder a thrust, since their goals are as old as a period of
+the bus."""
 _DAMPING_TIME = 0.025
 """The default damping as a time of the stiffness [s]."""
 
@@ -60,7 +60,7 @@ _ROUNDS = 8
 
 
 class MotorModel(Parameters):
-    """How motors differ from their nominal torque constants, as far as it is known.
+    """Differences of the motors from their nominal torque constants, as far as they are known.
 
     Values by motor are given by name or shell pattern; later entries win, and motors that none
     matches are nominal.
@@ -78,7 +78,7 @@ class MotorModel(Parameters):
     )
 
     def constants(self, robot: RobotDescription) -> Array:
-        """The factor of every motor, (n_joints,)."""
+        """Return the factor of every motor, (n_joints,)."""
         given = self.torque_constant
         patterns = given if isinstance(given, dict) else {"*": given}
         out = np.ones(len(robot.joints))
@@ -125,15 +125,15 @@ class DriveGains(Parameters):
     )
     sit_down_speed: float = parameter(
         0.0, unit="m/s", ge=0.0, le=0.5,
-        text="how fast a robot that stands at the end sits down before it is damped; zero: not",
+        text="speed at which a robot that stands at the end sits down before it is damped; zero: not",
     )  # fmt: skip
     motor_model: MotorModel = parameter(
-        MotorModel(), text="how the motors differ from their nominal torque constants"
+        MotorModel(), text="differences of the motors from their nominal torque constants"
     )
 
 
 def joint_gains(params: DriveGains, robot: RobotDescription) -> tuple[Array, Array]:
-    """The joints' gains that are to run in the drives [N m/rad, N m s/rad], each (n_joints,)."""
+    """Return the joints' gains that are to run in the drives [N m/rad, N m s/rad], each (n_joints,)."""
     peak = product(np.abs(robot.joint_to_motor).T, robot.motors.peak_torque)
     default = motor_gains(robot, peak / _REACH, "N m/rad")
     own = np.diag(default.joint).copy()
@@ -145,8 +145,8 @@ def joint_gains(params: DriveGains, robot: RobotDescription) -> tuple[Array, Arr
 
 
 def gain_requirements(params: DriveGains, robot: RobotDescription) -> Iterator[UnmetRequirement]:
-    """Report gains that no drives can give the joints, unless the nearest ones are asked for, and a
-    model of other motors."""
+    """Report gains that no drives can give the joints, unless the nearest ones are allowed, and a model of other
+    motors."""
     yield from params.motor_model.unmet(robot)
     if params.gains == "nearest":
         return
@@ -168,7 +168,7 @@ def gain_requirements(params: DriveGains, robot: RobotDescription) -> Iterator[U
 
 
 def lost_gains(params: DriveGains, robot: RobotDescription) -> dict[str, str]:
-    """What the drives do not give of the gains that the graph names, as a metric; empty if nothing."""
+    """Return the losses of the drives against the gains that the graph names, as a metric; empty if there are none."""
     found = [
         text
         for given, gains, unit in zip(
@@ -188,7 +188,7 @@ def _some(gains: MotorGains, limit: int = 4) -> str:
 
 
 class CommandTargets(Signal):
-    """What some commands say of the joints, a row for each command."""
+    """Targets of the joints by some commands, a row for each command."""
 
     torque = Field(
         ("n_queue", "n_joints"), unit="N m", text="feedforward joint torques", ring="active"
@@ -223,11 +223,11 @@ class MeasuredMotion(Signal):
 
 
 class GoalScratch(Signal):
-    """What ``make_goals`` computes on its way."""
+    """Intermediate values of ``make_goals``."""
 
     position_error = Field("n_joints", unit="rad", text="of the joints, against their targets")
     velocity_error = Field("n_joints", unit="rad/s", text="of the joints, against their targets")
-    joint_torque = Field("n_joints", unit="N m", text="the torques that are asked of the joints")
+    joint_torque = Field("n_joints", unit="N m", text="commanded torques of the joints")
 
 
 class Gears(NamedTuple):
@@ -253,7 +253,7 @@ class Gears(NamedTuple):
 
 @kernel
 def nominal_torque(gears: Gears, motor: int, torque: float, speed: float) -> float:
-    """The torque [N m] to ask of a motor by its nominal torque constant so that it gives ``torque``."""
+    """Return the torque [N m] to ask of a motor by its nominal torque constant so that it gives ``torque``."""
     constant, peak = gears.constant[motor], gears.peak[motor]
     lost = gears.load_friction * tanh(speed / SLIDING_SPEED)
     asked: float = torque / constant
@@ -268,7 +268,7 @@ def nominal_torque(gears: Gears, motor: int, torque: float, speed: float) -> flo
 
 @kernel
 def true_torque(gears: Gears, motor: int, asked: float, speed: float) -> float:
-    """The torque [N m] that a motor gives of what is asked of it: the inverse of ``nominal_torque``."""
+    """Return the torque [N m] that a motor gives for a commanded one: the inverse of ``nominal_torque``."""
     peak = gears.peak[motor]
     load = min(abs(asked) / peak, 1.0) if peak > 0.0 else 0.0
     given: float = asked * gears.constant[motor] * (1.0 - gears.saturation * load * load)
@@ -320,7 +320,7 @@ def make_goals(
     goals: MotorGoals,
     scratch: GoalScratch,
 ) -> None:
-    """The goals of all drives for the command in a row of ``commands``: see the module."""
+    """Compute the goals of all drives for the command in a row of ``commands``: see the module."""
     stiffness, damping = commands.stiffness[row], commands.damping[row]
     scratch.position_error[:] = commands.position[row] - measured.joint_position
     scratch.velocity_error[:] = commands.velocity[row] - measured.joint_velocity
@@ -393,7 +393,7 @@ class DriveGoals:
 
     def correct(self, velocity: Array, torque: Array) -> None:
         """Change measured joint torques [N m] to those that the motors give; the joints' velocity
-        [rad/s] says which way they turn."""
+        [rad/s] gives the direction of friction."""
         if self._nominal:
             return
         self._speed[:], self._torque[:] = velocity, torque
@@ -411,7 +411,7 @@ def gears_of(
     robot: RobotDescription, stiffness: Array, damping: Array, motor_stiffness: Array,
     motor_damping: Array, lead: float, motors: MotorModel | None = None,
 ) -> Gears:  # fmt: skip
-    """The gears of a robot; arguments as for ``DriveGoals``."""
+    """Return the gears of a robot; arguments as for ``DriveGoals``."""
     motors = motors or MotorModel()
     matrix = np.ascontiguousarray(robot.joint_to_motor)
     return Gears(
@@ -425,7 +425,7 @@ def gears_of(
 def correcting(
     params: DriveGains, robot: RobotDescription, velocity: Array, torque: Array
 ) -> list[KernelCall]:
-    """The call that corrects measured joint torques; none where all motors are nominal."""
+    """Return the call that corrects measured joint torques; none where all motors are nominal."""
     if params.motor_model == MotorModel():
         return []
     n = len(robot.joints)

@@ -1,4 +1,4 @@
-"""The velocity that is asked for with the sticks of a gamepad."""
+"""The velocity commanded with the sticks of a gamepad."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ AHEAD, ASIDE, TURN = 1, 0, 3
 JUMP, END = 0, 6
 """Buttons: A and back."""
 LOOK = 0.01
-"""So often the reader looks for events [s]."""
+"""Period of the reader's look for events [s]."""
 
 _sdl_lock = threading.Lock()
 _sdl_users = 0
@@ -73,7 +73,7 @@ class Gamepad(Block):
 
     outside = "real"
     params: Params
-    twist = Output(BodyTwist, text="the velocity that is asked for")
+    twist = Output(BodyTwist, text="the commanded velocity")
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
@@ -114,7 +114,7 @@ class Gamepad(Block):
             self.request_stop("back was pressed")
 
     def _share(self, deflection: float) -> float:
-        """The share of the whole velocity: it grows from zero at the edge of the dead zone."""
+        """Return the share of the whole velocity: it grows from zero at the edge of the dead zone."""
         beyond = max(abs(deflection) - self.params.dead, 0.0) / (1.0 - self.params.dead)
         return min(beyond, 1.0) * (1.0 if deflection >= 0.0 else -1.0)
 
@@ -126,7 +126,7 @@ class Gamepad(Block):
             self._reader = None
 
     def metrics(self) -> Mapping[str, Metric]:
-        """How many events came."""
+        """Return the number of events."""
         return {"events": self._events}
 
     def _read(self) -> None:

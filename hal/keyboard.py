@@ -20,18 +20,18 @@ KEYS: Mapping[str, tuple[int, int, int]] = {
     "\x1bOA": (1, 0, 0), "\x1bOB": (-1, 0, 0), "\x1bOD": (0, 1, 0), "\x1bOC": (0, -1, 0),
     "a": (0, 0, 1), "d": (0, 0, -1), " ": (0, 0, 0),
 }  # fmt: skip
-"""What a key asks for: how often the step ahead, aside and in turn."""
+"""The steps ahead, aside and in turn that a key commands."""
 QUIT = "q"
 LONGEST = 3
 """Characters of the longest of them."""
 LOOK = 0.05
-"""So often the reader looks whether the run has ended [s]."""
+"""Period of the reader's check that the run goes on [s]."""
 HELP = "arrows: ahead, back, aside; a, d: turn; space: on the spot; q: end"
 
 
 def split_keys(text: str) -> tuple[list[str], str]:
-    """The keys in what was typed, and the rest, which may be the beginning of another key. What is no
-    key is left out."""
+    """Split typed text into its keys and a rest, which may be the beginning of another key. What is no key is left
+    out."""
     found: list[str] = []
     while text:
         for length in range(min(LONGEST, len(text)), 0, -1):
@@ -59,7 +59,7 @@ class Keyboard(Block):
     q             ends the run
     ============  =================================
 
-    Keys that come before the next jump is asked for add up: up and a are a jump ahead with a turn.
+    Keys that come before the next jump is requested add up: up and a are a jump ahead with a turn.
     The ``number`` grows with each key. A thread reads the terminal, so a tick only copies numbers. The
     terminal must be one: the block raises ``BlockError`` at the start where standard input is a file or a
     pipe. When the run ends the terminal is as it was. A replay takes the commands from the recording.
@@ -141,7 +141,7 @@ class Keyboard(Block):
             self._terminal = None
 
     def metrics(self) -> Mapping[str, Metric]:
-        """How many keys came."""
+        """Return the number of keys."""
         return {"keys": self._number}
 
     def _read(self) -> None:

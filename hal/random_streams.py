@@ -64,13 +64,13 @@ _MOUNTED = 100
 
 
 def stream(seed: int, purpose: Purpose) -> np.random.Generator:
-    """A new stream for a seed and a purpose."""
+    """Return a new stream for a seed and a purpose."""
     sequence = np.random.SeedSequence(seed, spawn_key=(int(purpose),))
     return np.random.Generator(np.random.PCG64(sequence))
 
 
 def sensor_stream(seed: int, sensor: str, number: int) -> np.random.Generator:
-    """A new stream for one of the errors of a sensor that a robot's description mounts."""
+    """Return a new stream for one of the errors of a sensor that a robot's description mounts."""
     key = (_MOUNTED, zlib.crc32(sensor.encode()), number)
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key)))
 
@@ -97,7 +97,7 @@ class RandomStreams:
         return self._streams[purpose]
 
     def of_field(self, sensor: str, number: int) -> np.random.Generator:
-        """The noise of a field of a mounted sensor, by its number in the signal."""
+        """Return the noise of a field of a mounted sensor, by its number in the signal."""
         return self._streams[sensor, number]
 
     def save(self, out: NDArray[np.int64]) -> None:

@@ -33,7 +33,7 @@ from .sensors.sensor import MountedSensor, mounted_sensors
 from .sitting import SitDown, SittingPath, sitting_path, stands
 
 STOP_CYCLES = 5
-"""How many stop cycles the runtime makes."""
+"""Number of stop cycles that the runtime makes."""
 
 
 @kernel
@@ -66,19 +66,19 @@ class Robot(Block, ABC):
     instant ``t_n`` (``emit``). The controller runs. Then the robot takes the command and its time
     goes on to ``t_{n+1}`` (``update``).
 
-    A driver implements five methods, ``report`` if its drives say how they are, and ``wait`` if it
+    A driver implements five methods, ``report`` if its drives report their condition, and ``wait`` if it
     has a clock. ``open`` is called once. The others are called by the
     control thread once in every tick, so they must not allocate arrays, must not wait without a
     time-out, and must not raise because a single packet is bad:
 
     * ``read`` writes the latest sensor sample into ``imu``, ``joints``, ``contacts`` and the outputs of
       mounted sensors.
-    * ``report`` writes into ``health`` how the drives and the sensors are. What ``Robot`` has says
+    * ``report`` writes into ``health`` how the drives and the sensors are. That of ``Robot`` reports
       that all is well, at the tick's own time.
     * ``write`` sends ``command`` to the drives.
     * ``advance`` lets the time to the next tick pass. A simulator computes it. A real robot returns
       at once: its time passes by itself.
-    * ``wait`` waits for the next cycle of the robot's own clock, and says how many were missed. The
+    * ``wait`` waits for the next cycle of the robot's own clock, and returns how many were missed. The
       runtime calls it before every tick of a graph whose ``clock`` is ``robot``, and never else. A
       simulator, whose time passes in ``advance``, returns at once: it is what ``Robot`` has.
     * ``damp`` is one stop cycle: it puts all drives into damping, whatever was commanded, and lets
@@ -92,7 +92,7 @@ class Robot(Block, ABC):
     cycles, then ``close``, which disables the drives and frees the link. ``close`` may be called
     although ``open`` has failed or was never called.
 
-    A robot whose description says that it has no IMU, or no contact switches, publishes zeros at
+    A robot whose description has no IMU, or no contact switches, publishes zeros at
     that port; a wire from there is an error at load.
 
     Errors: ``open`` raises what the link raises, with the name of the device. When the link is lost
@@ -109,7 +109,7 @@ class Robot(Block, ABC):
     joints = Output(JointState, text="joint encoders and motor currents, at the same instant")
     contacts = Output(ContactSwitches, text="tactile switches, at the same instant")
     health = Output(RobotHealth, text="voltages, temperatures, currents, conditions and ages")
-    command = Input(JointCommand, text="what the drives are to do")
+    command = Input(JointCommand, text="command to the drives")
 
     @classmethod
     def specialize(
@@ -119,8 +119,8 @@ class Robot(Block, ABC):
         robot: RobotDescription | None = None,
         graph_folder: Path | None = None,
     ) -> type[Block]:
-        """The class with an output for every sensor that the robot's description mounts, and with
-        the reason at every output that the robot does not have."""
+        """Make the class with an output for every sensor that the robot's description mounts, and with the reason at
+        every output that the robot does not have."""
         sensors = mounted_sensors(robot, folder)
         sensors = () if all(sensor.name in cls.outputs for sensor in sensors) else sensors
         absent = {} if robot is None else cls._absent_outputs(robot)
@@ -148,7 +148,7 @@ class Robot(Block, ABC):
 
     @classmethod
     def ports_of(cls, sensors: tuple[MountedSensor, ...]) -> dict[str, Port[Any]]:
-        """The ports for mounted sensors, by name."""
+        """Return the ports for mounted sensors, by name."""
         return {
             sensor.name: Output(
                 sensor.signal,
@@ -159,19 +159,21 @@ class Robot(Block, ABC):
 
     @classmethod
     def ports_of_thrusters(cls, robot: RobotDescription) -> dict[str, Port[Any]]:
-        """The ports for thrusters, by name; none where it has none, or this driver does not serve them.
+        """Return the ports for thrusters, by name; none where it has none, or this driver does not serve them.
 
         A driver that does serves ``thrust_ports``."""
         return {}
 
     @staticmethod
     def thrust_ports(robot: RobotDescription) -> dict[str, Port[Any]]:
-        """The input and the output of a robot with thrusters. Without joints it needs no joint command."""
+        """Return the input and the output of a robot with thrusters. Without joints it needs no joint command."""
         if not robot.thrusters:
             return {}
         ports: dict[str, Port[Any]] = {
-            "thrust": Input(ThrustCommand, text="what the thrusters are to give"),
-            "thrusters": Output(ThrusterState, text="what they give, at the start of the tick"),
+            "thrust": Input(ThrustCommand, text="command to the thrusters"),
+            "thrusters": Output(
+                ThrusterState, text="state of the thrusters at the start of the tick"
+            ),
         }
         if not robot.joints:
             active = {"mode": int(CommandMode.ACTIVE)}
@@ -180,12 +182,12 @@ class Robot(Block, ABC):
         return ports
 
     def mounted(self) -> dict[str, Signal]:
-        """The outputs of the mounted sensors, by name."""
+        """Return the outputs of the mounted sensors, by name."""
         return {name: getattr(self, name) for name in self.robot.sensors.mounted}
 
     @staticmethod
     def _absent_outputs(robot: RobotDescription) -> Mapping[str, str]:
-        """The outputs that a robot's description says it does not have, each with the reason."""
+        """Return the outputs that a robot does not have by its description, each with the reason."""
         absent: dict[str, str] = {}
         if not robot.sensors.imu:
             absent["imu"] = f"{robot.name} has no IMU"
@@ -197,14 +199,14 @@ class Robot(Block, ABC):
 
     @classmethod
     def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
-        """What the graph may compensate: ``delay``, from sensing to torque [s], and ``imu_position``, where the
-        IMU is told to be, from the base's origin [m, base]."""
+        """Export what the graph may compensate: ``delay``, from sensing to torque [s], and ``imu_position``, the
+        nominal place of the IMU, from the base's origin [m, base]."""
         return {"delay": cls.nominal_delay(params), "imu_position": [0.0, 0.0, 0.0]}
 
     @classmethod
     def nominal_delay(cls, params: Parameters) -> float:
-        """The delay [s] from an instant of the control clock, at which the sensors are read, to
-        the torques that are computed from them. A driver that knows its own says so here."""
+        """Return the delay [s] from an instant of the control clock, at which the sensors are read, to the torques that
+        are computed from them. A driver that knows its own returns it here."""
         return 0.002
 
     def emit(self) -> None:
@@ -246,7 +248,7 @@ class Robot(Block, ABC):
             self.damp()
 
     def _go_down(self, way: SitDown) -> bool:
-        """Go a part of the way down; says whether the drives have followed."""
+        """Go a part of the way down; return whether the drives have followed."""
         parts = STOP_CYCLES - 1
         for tick in range((self._stops - 1) * way.ticks // parts, self._stops * way.ticks // parts):
             self.read()
@@ -259,7 +261,7 @@ class Robot(Block, ABC):
         return True
 
     def _can_sit_down(self, path: SittingPath) -> bool:
-        """Whether the robot is to sit down, and stands on driven legs."""
+        """Check whether the robot is to sit down, and stands on driven legs."""
         if len(path.pose) < 2 or self.command.mode != CommandMode.ACTIVE:
             return False
         self.emit()
@@ -287,7 +289,7 @@ class Robot(Block, ABC):
         return self.reporting()
 
     def reporting(self) -> KernelCall:
-        """Writes to ``health`` that all is well, at the tick's own time."""
+        """Return the call that writes to ``health`` that all is well, at the tick's own time."""
         clock = self.context.clock
         return signal_call(report_healthy, clock.present, clock.base_period, self.health)
 

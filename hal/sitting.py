@@ -28,11 +28,11 @@ _STEP, _SMALLEST_STEP = 0.02, 0.001
 _LOWEST = 0.6
 """The share of the standing height by which the torso comes down at most."""
 _MARGIN = 0.005
-"""How far every joint stays from its limits [rad]."""
+"""Margin of every joint to its limits [rad]."""
 _OFF = 0.002
-"""How far contact points may be from their places on the path [m]."""
+"""Largest distance of contact points from their places on the path [m]."""
 _SINKING = 0.1
-"""How far a leg yields under the robot's weight with the gains of the way down [rad]."""
+"""Yielding of a leg under the robot's weight with the gains of the way down [rad]."""
 _DAMPING = 0.02
 """The damping of these gains, for one unit of stiffness [s]."""
 _STILL = 1.0
@@ -52,7 +52,7 @@ class SittingPath(NamedTuple):
 
 
 def sitting_path(robot: RobotDescription) -> SittingPath:
-    """The joints' way from the standing pose to the lowest one."""
+    """Compute the joints' way from the standing pose to the lowest one."""
     start = robot.standing_position
     depths, poses = [0.0], [start]
     standing = _places(robot, start[None])[0]
@@ -76,7 +76,7 @@ def sitting_path(robot: RobotDescription) -> SittingPath:
 
 
 def _places(robot: RobotDescription, positions: Array) -> Array:
-    """The contact points under a level torso, (n, n_contacts, 3) [m]: ahead of the centre of mass, left of it,
+    """Compute the contact points under a level torso, (n, n_contacts, 3) [m]: ahead of the centre of mass, left of it,
     above the torso's origin."""
     count = len(positions)
     level = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
@@ -95,7 +95,7 @@ def _places(robot: RobotDescription, positions: Array) -> Array:
 
 
 def _towards(robot: RobotDescription, pose: Array, wanted: Array) -> Array:
-    """A step of the joints towards contact points at their ``wanted`` places."""
+    """Compute a step of the joints towards contact points at their ``wanted`` places."""
     n, small = len(pose), 1e-5
     found = _places(robot, pose + small * np.vstack([np.zeros(n), np.eye(n)]))
     slopes = ((found[1:] - found[0]) / small).reshape(n, -1).T
@@ -108,7 +108,7 @@ def _towards(robot: RobotDescription, pose: Array, wanted: Array) -> Array:
 def stands(
     robot: RobotDescription, imu: ImuReading, joints: JointState, contacts: ContactSwitches
 ) -> bool:
-    """Whether a robot stands still and upright on all its feet."""
+    """Check whether a robot stands still and upright on all its feet."""
     still = bool((np.abs(joints.velocity) < _STILL).all())
     near = bool((np.abs(joints.position - robot.standing_position) < _NEAR).all())
     upright = on_feet = True

@@ -1,4 +1,4 @@
-"""What is seen and kept: recordings of runs, written and read back."""
+"""Recordings of runs, written, read back and shown."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from .arrays import Array1D, Array2D, Flags1D, Indices1D
 from .kernel import kernel
 
 INFEASIBLE = -1
-"""No x fulfils the constraints."""
+"""Return code: no x fulfils the constraints."""
 NOT_CONVEX = -2
 """P is not positive definite, or a number is not finite."""
 TOO_LONG = -3
@@ -144,7 +144,7 @@ def fulfil(
 def start_unconstrained(
     n: int, program: QuadraticProgram, memory: ActiveSetMemory, x: Array1D
 ) -> bool:
-    """The minimum without constraints, and J = L^-T of the Cholesky factor P = L L'.
+    """Compute the minimum without constraints, and J = L^-T of the Cholesky factor P = L L'.
 
     Returns whether P is positive definite.
     """
@@ -233,7 +233,7 @@ def recompute_multipliers(n: int, count: int, gradient: Array1D, memory: ActiveS
 
 @kernel
 def violation(n: int, program: QuadraticProgram, row: int, x: Array1D) -> float:
-    """By how much x violates a constraint; negative where it does not."""
+    """Compute the violation of a constraint by x; negative where x fulfils it."""
     total: float = -program.bound[row]
     for k in range(n):
         total += program.matrix[row, k] * x[k]
@@ -244,7 +244,7 @@ def violation(n: int, program: QuadraticProgram, row: int, x: Array1D) -> float:
 def most_violated(
     n: int, m: int, program: QuadraticProgram, memory: ActiveSetMemory, x: Array1D
 ) -> int:
-    """The constraint that x violates by the longest distance; -1 where it violates none."""
+    """Return the constraint that x violates by the longest distance; -1 where it violates none."""
     found, largest = -1, 0.0
     for i in range(m):
         if memory.is_active[i]:
@@ -263,7 +263,7 @@ def most_violated(
 def find_step(
     n: int, count: int, new: int, excess: float, program: QuadraticProgram, memory: ActiveSetMemory
 ) -> tuple[int, float, float]:
-    """The directions towards a new constraint, and how far they may be followed.
+    """Find the directions towards a new constraint, and how far they may be followed.
 
     Args:
         count: the number of active constraints.

@@ -1,7 +1,8 @@
 """The types of the arrays that the whole package computes with, named once.
 
-A kernel that is written as equations says of each array how many dimensions it has: ``Array1D`` is a
-vector, ``Array2D`` a matrix, ``Vector3`` a vector of three. ``Array``, ``Flags`` and ``Indices`` leave it open.
+A kernel that is written as equations declares the dimensions of each array: ``Array1D`` is a
+vector, ``Array2D`` a matrix, ``Vector3`` a vector of three. ``Array``, ``Flags`` and ``Indices``
+leave them open.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from numpy.typing import NDArray
 
 
 class Rank(NamedTuple):
-    """How many dimensions an array has, the type of its elements for Python, and known sizes."""
+    """Rank of an array: its number of dimensions, the type of its elements for Python, and known
+    sizes."""
 
     dimensions: int
     element: type
@@ -24,7 +26,7 @@ Array: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
 Indices: TypeAlias = NDArray[np.int64]
 Counts: TypeAlias = NDArray[np.int64]
-"""As ``Indices``, for numbers that say how many."""
+"""Array like ``Indices``, for counts."""
 
 if TYPE_CHECKING:  # a type checker takes the number x[()] for an array
     Array0D: TypeAlias = Any

@@ -21,7 +21,7 @@ def assemble_normal(
     starts: Indices1D, rows: Indices1D, values: Array1D, inverse_weights: Array1D,
     place: Indices1D, equations: int, band: Array2D, last: Indices1D, chosen: Indices1D,
 ) -> bool:  # fmt: skip
-    """A W^-1 A' of the chosen rows of a sparse matrix, in columns with ascending rows.
+    """Assemble A W^-1 A' of the chosen rows of a sparse matrix, in columns with ascending rows.
 
     Args:
         starts, rows, values: the non-zeros of column c are ``values[starts[c]:starts[c + 1]]``.
@@ -70,8 +70,8 @@ def assemble_normal(
 
 @kernel
 def factorise_band(equations: int, regularisation: float, band: Array2D, last: Indices1D) -> bool:
-    """The Cholesky factor, in place. To its diagonal the matrix gets that share of it. An equation without
-    a variable that may change, whose diagonal is zero, holds nothing.
+    """Compute the Cholesky factor in place, with that share of the diagonal added to it. An
+    equation without a variable that may change, whose diagonal is zero, holds nothing.
 
     Four columns are eliminated together, so that a row of the band is read and written once for all. Each entry
     loses their products in the same order as one by one.
@@ -139,7 +139,8 @@ def smallest_correction(
     band: Array2D, last: Indices1D, chosen: Indices1D, vector: Array1D, out: Array1D,
     factorised: Flags1D, found: Flags1D,
 ) -> None:  # fmt: skip
-    """The x with the smallest x'Wx whose chosen rows of A x are the ``vector``, which becomes y.
+    """Compute the x with the smallest x'Wx whose chosen rows of A x are the ``vector``, which
+    becomes y.
 
     If ``factorised`` (1,), ``band`` and ``last`` still hold the factor for the same rows of a matrix near A. ``found``
     (1,) tells whether there is an x: all equations are inside of the band and independent.

@@ -29,7 +29,7 @@ from .rotations import rotate_about_axis
 
 
 class BodyTree(NamedTuple):
-    """What does not change: every joint's parent comes before it.
+    """Constant data of a tree of bodies: every joint's parent comes before it.
 
     ``parent`` (n_joints,) is the body that carries a joint; ``origin`` (n_joints, 3) [m] is where, in the
     parent's frame; ``axis`` (n_joints, 3) is the joint's axis in both frames, about which it turns, or
@@ -48,7 +48,7 @@ class BodyTree(NamedTuple):
 
 
 class BodyMotion(NamedTuple):
-    """What follows from the joints' and the base's motion.
+    """Quantities that follow from the joints' and the base's motion.
 
     ``rotation`` (n_bodies, 3, 3) takes a body's vectors to the world, ``place`` (n_bodies, 3) [m] is its
     frame's origin. ``joint`` (n_joints, 6) is the spatial velocity that a joint gives per unit of its
@@ -79,7 +79,8 @@ def body_motion(n_joints: int) -> BodyMotion:
 
 @kernel
 def place_bodies(tree: BodyTree, position: Array1D, motion: BodyMotion) -> None:
-    """Where all bodies are at the joints' positions [rad, or m for a slide], (n_joints,)."""
+    """Compute the places of all bodies at the joints' positions [rad, or m for a slide],
+    (n_joints,)."""
     for k in range(position.shape[0]):
         carrier = tree.parent[k]
         rotation, place, joint = motion.rotation[carrier], motion.place[k + 1], motion.joint[k]
@@ -107,8 +108,8 @@ def place_bodies(tree: BodyTree, position: Array1D, motion: BodyMotion) -> None:
 
 @kernel
 def move_bodies(tree: BodyTree, speed: Array1D, motion: BodyMotion) -> None:
-    """The velocities of all placed bodies at the joints' speeds [rad/s or m/s], (n_joints,), and
-    their accelerations while no generalised velocity changes.
+    """Compute the velocities of all placed bodies at the joints' speeds [rad/s or m/s],
+    (n_joints,), and their accelerations while no generalised velocity changes.
 
     V = V_parent + S q', and as S moves with the parent, A = A_parent + V_parent x S q'.
     """
@@ -132,8 +133,9 @@ def move_bodies(tree: BodyTree, speed: Array1D, motion: BodyMotion) -> None:
 
 
 @kernel
-def place_of(motion: BodyMotion, body: int, local: Vector3, out: Vector3) -> None:
-    """The place (3,) of a body's point that is at ``local`` (3,) in the body's frame [m]."""
+def point_position(motion: BodyMotion, body: int, local: Vector3, out: Vector3) -> None:
+    """Compute the place (3,) of a body's point that is at ``local`` (3,) in the body's frame
+    [m]."""
     x, y, z = local[0], local[1], local[2]
     for row in range(3):
         turned = (
@@ -146,7 +148,7 @@ def place_of(motion: BodyMotion, body: int, local: Vector3, out: Vector3) -> Non
 
 @kernel
 def velocity_at(motion: BodyMotion, body: int, place: Array1D, out: Array1D) -> None:
-    """The velocity (3,) of a body's point at ``place`` (3,) [m/s]: v + w x r."""
+    """Compute the velocity (3,) of a body's point at ``place`` (3,) [m/s]: v + w x r."""
     x, y, z = place[0], place[1], place[2]
     spatial = motion.velocity[body]
     p, q, r = spatial[3], spatial[4], spatial[5]
@@ -157,7 +159,8 @@ def velocity_at(motion: BodyMotion, body: int, place: Array1D, out: Array1D) -> 
 
 @kernel
 def acceleration_at(motion: BodyMotion, body: int, place: Array1D, out: Array1D) -> None:
-    """The acceleration (3,) of a body's point at ``place`` (3,) [m/s^2]: a + w' x r + w x v_r."""
+    """Compute the acceleration (3,) of a body's point at ``place`` (3,) [m/s^2]: a + w' x r + w x
+    v_r."""
     velocity_at(motion, body, place, out)
     u, v, w = out[0], out[1], out[2]
     x, y, z = place[0], place[1], place[2]
@@ -220,7 +223,8 @@ def turn_inertia(inertia: Array1D, rotation: Matrix3, turned: Matrix3, out: Arra
 
 @kernel
 def momentum_of(inertias: Inertias, body: int, spatial: Array1D, out: Array1D) -> None:
-    """The spatial momentum (6,) of a body, with all that it carries, at a spatial velocity (6,)."""
+    """Compute the spatial momentum (6,) of a body, with all that it carries, at a spatial velocity
+    (6,)."""
     mass, moment, inertia = (
         inertias.mass[body],
         inertias.moment[body],
@@ -241,9 +245,10 @@ def momentum_of(inertias: Inertias, body: int, spatial: Array1D, out: Array1D) -
 
 @kernel
 def body_inertia_and_wrench(tree: BodyTree, motion: BodyMotion, body: int, own: Inertias) -> None:
-    """A body's own inertia, and the force that gives it its acceleration: f = I a + v x* I v."""
+    """Compute a body's own inertia, and the force that gives it its acceleration: f = I a + v x* I
+    v."""
     mass = tree.mass[body]
-    place_of(motion, body, tree.com[body], own.centre)
+    point_position(motion, body, tree.com[body], own.centre)
     x, y, z = own.centre[0], own.centre[1], own.centre[2]
     own.mass[body] = mass
     own.moment[body, 0], own.moment[body, 1], own.moment[body, 2] = mass * x, mass * y, mass * z
@@ -273,7 +278,7 @@ def body_inertia_and_wrench(tree: BodyTree, motion: BodyMotion, body: int, own: 
 
 @kernel
 def composite_inertias(tree: BodyTree, motion: BodyMotion, composite: Inertias) -> None:
-    """The inertia and the force of every body with all that it carries."""
+    """Compute the inertia and the force of every body with all that it carries."""
     n_joints = motion.joint.shape[0]
     for body in range(n_joints + 1):
         body_inertia_and_wrench(tree, motion, body, composite)
@@ -290,7 +295,7 @@ def composite_inertias(tree: BodyTree, motion: BodyMotion, composite: Inertias) 
 
 @kernel
 def inner(a: Array1D, b: Array1D) -> float:
-    """The inner product of two spatial vectors (6,)."""
+    """Return the inner product of two spatial vectors (6,)."""
     total = 0.0
     for k in range(6):
         total += a[k] * b[k]
@@ -301,7 +306,8 @@ def inner(a: Array1D, b: Array1D) -> float:
 def point_jacobian(
     tree: BodyTree, motion: BodyMotion, body: int, place: Vector3, out: Array2D
 ) -> None:
-    """The Jacobian (3, n_velocities) of a body's point: v + w x r of every generalised velocity."""
+    """Compute the Jacobian (3, n_velocities) of a body's point: v + w x r of every generalised
+    velocity."""
     for row in range(3):
         out[row, :] = 0.0
     x, y, z = place[0], place[1], place[2]
@@ -324,7 +330,8 @@ def point_jacobian(
 
 @kernel
 def rotation_jacobian(tree: BodyTree, motion: BodyMotion, body: int, out: Array2D) -> None:
-    """The angular velocity [rad/s, world] of a body for every generalised velocity, (3, n_velocities)."""
+    """Compute the angular velocity [rad/s, world] of a body for every generalised velocity, (3,
+    n_velocities)."""
     out[:, :] = 0.0
     for row in range(3):
         for k in range(3):

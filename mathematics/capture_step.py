@@ -50,7 +50,8 @@ def capture_point(
 def nearest_in_foot(
     points: Array2D, foot_of_point: Indices1D, foot: int, place: Array1D, out: Array1D
 ) -> float:
-    """The place ``out`` (2,) nearest to a ``place`` (2,) between two contact points of a ``foot``.
+    """Find the place ``out`` (2,) nearest to a ``place`` (2,) between two contact points of a
+    ``foot``.
 
     Args:
         points: all contact points [m], (n, 3).
@@ -85,7 +86,7 @@ def nearest_in_foot(
 def farthest_foot(
     points: Array2D, foot_of_point: Indices1D, n_feet: int, place: Array1D, scratch: Array1D
 ) -> int:
-    """The foot that is farthest from a ``place`` (2,): the one that carries least there.
+    """Find the foot that is farthest from a ``place`` (2,): the one that carries least there.
 
     ``scratch`` has the shape (2,).
     """
@@ -131,7 +132,8 @@ def limit_foothold(
 
 @kernel
 def approach(place: float, speed: float, goal: float, left: float) -> float:
-    """The acceleration [m/s^2] now of the motion that arrives at ``goal`` at rest after ``left`` [s].
+    """Return the present acceleration [m/s^2] of the motion that reaches ``goal`` at rest after
+    ``left`` [s].
 
     It is the motion of least mean square acceleration: 6 (goal - place) / left^2 - 4 speed / left.
     """
@@ -156,7 +158,7 @@ def spread_to_feet(stance: Flags1D, foot: Indices1D, n_feet: int, out: Flags1D) 
 
 @kernel
 def support_margin(points: Array2D, loaded: Flags1D, x: float, y: float) -> float:
-    """The distance [m] of the place (``x``, ``y``) from the edge of the support polygon.
+    """Return the distance [m] of the place (``x``, ``y``) from the edge of the support polygon.
 
     The support polygon is the convex hull of the ``loaded`` ones of ``points`` (n, 2 or 3). The
     margin is positive inside, and negative outside or if the hull has no area. A pair of points

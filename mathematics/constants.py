@@ -8,7 +8,8 @@ GRAVITY: Final = 9.81
 """Acceleration of free fall [m/s^2], downwards along the world's z axis."""
 
 COPPER: Final = 0.0039
-"""By which share of its value at 25 deg C the resistance of copper grows with each kelvin [1/K]."""
+"""Relative growth of the resistance of copper per kelvin, of its value at 25 deg C [1/K]."""
 
 MAGNETS: Final = 0.0012
-"""By which share magnets of neodymium-iron-boron weaken with each kelvin [1/K]; data sheets: 0.0011 to 0.0012."""
+"""Relative weakening of neodymium-iron-boron magnets per kelvin [1/K]; data sheets: 0.0011 to
+0.0012."""

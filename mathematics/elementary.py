@@ -30,16 +30,17 @@ _SPLIT = 134217729.0
 
 
 @kernel
-def sum_of(a: float, b: float) -> tuple[float, float]:
-    """``a + b`` exactly, as a sum of two numbers (D. E. Knuth, The Art of Computer Programming 2, 4.2.2)."""
+def two_sum(a: float, b: float) -> tuple[float, float]:
+    """Compute ``a + b`` exactly, as a sum of two numbers (D. E. Knuth, The Art of Computer
+    Programming 2, 4.2.2)."""
     high = a + b
     part = high - a
     return high, (a - (high - part)) + (b - part)
 
 
 @kernel
-def product_of(a: float, b: float) -> tuple[float, float]:
-    """``a b`` exactly, as a sum of two numbers, where nothing leaves the range (Dekker)."""
+def two_product(a: float, b: float) -> tuple[float, float]:
+    """Compute ``a b`` exactly, as a sum of two numbers, where nothing leaves the range (Dekker)."""
     high = a * b
     x, y = _SPLIT * a, _SPLIT * b
     a_high, b_high = x - (x - a), y - (y - b)
@@ -54,16 +55,17 @@ def _less_turns(
     """``high + low + rest`` without so many quarter turns of ``unit`` each."""
     for k in range(4):
         part = _PI_1 if k == 0 else (_PI_2 if k == 1 else (_PI_3 if k == 2 else _PI_4))
-        high, error = sum_of(high, -(turns * (unit * part)))
-        low, error = sum_of(low, error)
+        high, error = two_sum(high, -(turns * (unit * part)))
+        low, error = two_sum(low, error)
         rest += error
-    high, low = sum_of(high, low)
+    high, low = two_sum(high, low)
     return high, low, rest
 
 
 @kernel
 def reduce_angle(angle: float) -> tuple[float, float, int]:
-    """What an angle [rad] exceeds the nearest quarter turn by, as a sum of two numbers, and which of the four it is.
+    """Reduce an angle [rad] to its distance from the nearest quarter turn, as a sum of two numbers,
+    and the index of that quarter turn.
 
     Not a number beyond 2^53, where neighbouring numbers are more than a radian apart.
     """
@@ -73,9 +75,9 @@ def reduce_angle(angle: float) -> tuple[float, float, int]:
         return math.nan, 0.0, 0
     if abs(angle) < 1048576.0:
         turns = math.floor(angle * _TURNS + 0.5)
-        high, low = sum_of(angle - turns * _PI_1, -(turns * _PI_2))
+        high, low = two_sum(angle - turns * _PI_1, -(turns * _PI_2))
         if abs(high) > 1e-6:
-            high, low = sum_of(high, low - turns * _HALF_PI_LOW)
+            high, low = two_sum(high, low - turns * _HALF_PI_LOW)
             return high, low, turns % 4
     high, low, rest = angle, 0.0, 0.0
     if abs(angle) > _SHARE:
@@ -83,7 +85,7 @@ def reduce_angle(angle: float) -> tuple[float, float, int]:
         high, low, rest = _less_turns(high, low, rest, float(turns), _SHARE)
     turns = math.floor(high * _TURNS + 0.5)
     high, low, rest = _less_turns(high, low, rest, float(turns), 1.0)
-    high, low = sum_of(high, low + rest)
+    high, low = two_sum(high, low + rest)
     return high, low, turns % 4
 
 
@@ -113,7 +115,7 @@ def _cosine(r: float, low: float) -> float:
 
 @kernel
 def sin(angle: float) -> float:
-    """The sine of an angle [rad]."""
+    """Return the sine of an angle [rad]."""
     if abs(angle) < 1e-9:
         return angle
     r, low, quarter = reduce_angle(angle)
@@ -123,7 +125,7 @@ def sin(angle: float) -> float:
 
 @kernel
 def cos(angle: float) -> float:
-    """The cosine of an angle [rad]."""
+    """Return the cosine of an angle [rad]."""
     r, low, quarter = reduce_angle(angle)
     value = _cosine(r, low) if quarter % 2 == 0 else _sine(r, low)
     return value if quarter == 0 or quarter == 3 else -value
@@ -143,7 +145,8 @@ def sincos(angle: float) -> tuple[float, float]:
 
 @kernel
 def _first_octant(a: float, a_low: float, b: float, b_low: float) -> tuple[float, float]:
-    """The arc tangent of (a + a_low) / (b + b_low), between 0 and 1, as a sum of two numbers.
+    """Return the arc tangent of (a + a_low) / (b + b_low), between 0 and 1, as a sum of two
+    numbers.
 
     Of the angles 0, atan 1/2 and pi/4 one near is taken off: tan(x - y) = (tan x - tan y) / (1 + tan x tan y).
     """
@@ -152,12 +155,12 @@ def _first_octant(a: float, a_low: float, b: float, b_low: float) -> tuple[float
         tangent, start, start_low = 1.0, 0.7853981633974483, 3.061616997868383e-17
     elif a > 0.25 * b:
         tangent, start, start_low = 0.5, _ATAN_HALF, _ATAN_HALF_LOW
-    top, top_low = sum_of(a, -(tangent * b))
-    bottom, bottom_low = sum_of(b, tangent * a)
+    top, top_low = two_sum(a, -(tangent * b))
+    bottom, bottom_low = two_sum(b, tangent * a)
     top_low += a_low - tangent * b_low
     bottom_low += b_low + tangent * a_low
     t = top / bottom
-    high, low = product_of(t, bottom)
+    high, low = two_product(t, bottom)
     rest = ((top - high) - low + top_low - t * bottom_low) / bottom
     z = t * t
     series = -0.3333333333333333 + z * (
@@ -167,29 +170,29 @@ def _first_octant(a: float, a_low: float, b: float, b_low: float) -> tuple[float
             )))
         )))
     )  # fmt: skip
-    angle, error = sum_of(start, t)
+    angle, error = two_sum(start, t)
     return angle, error + (start_low + (rest + t * (z * series)))
 
 
 @kernel
 def _angle_of(y: float, y_low: float, x: float, x_low: float) -> float:
-    """The angle of the point (x + x_low, y + y_low) with y not below zero, from 0 to pi."""
+    """Return the angle of the point (x + x_low, y + y_low) with y not below zero, from 0 to pi."""
     side, side_low = (x, x_low) if x >= 0.0 else (-x, -x_low)
     if y <= side:
         high, low = _first_octant(y, y_low, side, side_low)
     else:
         high, low = _first_octant(side, side_low, y, y_low)
-        high, error = sum_of(_HALF_PI, -high)
+        high, error = two_sum(_HALF_PI, -high)
         low = error + (_HALF_PI_LOW - low)
     if x < 0.0:
-        high, error = sum_of(2.0 * _HALF_PI, -high)
+        high, error = two_sum(2.0 * _HALF_PI, -high)
         low = error + (2.0 * _HALF_PI_LOW - low)
     return high + low
 
 
 @kernel
 def atan2(y: float, x: float) -> float:
-    """The angle of the point (x, y) [rad], from -pi to pi. Signs of zeros count, as in C."""
+    """Return the angle of the point (x, y) [rad], from -pi to pi. Signs of zeros count, as in C."""
     above, side = abs(y), abs(x)
     if math.isnan(x) or math.isnan(y):
         return math.nan
@@ -213,12 +216,12 @@ def atan2(y: float, x: float) -> float:
 
 @kernel
 def acos(cosine: float) -> float:
-    """The arc cosine [rad], from 0 to pi; not a number beyond -1 and 1."""
+    """Return the arc cosine [rad], from 0 to pi; not a number beyond -1 and 1."""
     if not abs(cosine) <= 1.0:
         return math.nan
-    less, less_low = sum_of(1.0, -cosine)
-    more, more_low = sum_of(1.0, cosine)
-    square, square_low = product_of(less, more)
+    less, less_low = two_sum(1.0, -cosine)
+    more, more_low = two_sum(1.0, cosine)
+    square, square_low = two_product(less, more)
     square_low += less * more_low + less_low * more
     if square <= 0.0:
         return 0.0 if cosine > 0.0 else 2.0 * _HALF_PI
@@ -228,9 +231,9 @@ def acos(cosine: float) -> float:
 
 @kernel
 def _root_of(high: float, low: float) -> tuple[float, float]:
-    """The square root of ``high + low``, above zero, as a sum of two numbers."""
+    """Return the square root of ``high + low``, above zero, as a sum of two numbers."""
     root = math.sqrt(high)
-    square, error = product_of(root, root)
+    square, error = two_product(root, root)
     return root, ((high - square) - error + low) / (2.0 * root)
 
 
@@ -247,9 +250,9 @@ def hypot(x: float, y: float) -> float:
         scale = 2.0**-600
     elif largest < 1e-150:
         scale = 2.0**600
-    square, low = product_of(scale * largest, scale * largest)
-    other, other_low = product_of(scale * least, scale * least)
-    square, error = sum_of(square, other)
+    square, low = two_product(scale * largest, scale * largest)
+    other, other_low = two_product(scale * least, scale * least)
+    square, error = two_sum(square, other)
     root, rest = _root_of(square, low + other_low + error)
     return (root + rest) / scale
 
@@ -270,10 +273,10 @@ def _power_of_two(exponent: int) -> float:
 def _exponential(x: float) -> tuple[float, float, int]:
     """e^x - 1 without its power of two: (high + low) with e^x = 2^k (1 + high + low), and k."""
     k = math.floor(x * 1.4426950408889634 + 0.5)
-    high, low = sum_of(x, -(k * _LN2_1))
-    high, error = sum_of(high, -(k * _LN2_2))
+    high, low = two_sum(x, -(k * _LN2_1))
+    high, error = two_sum(high, -(k * _LN2_2))
     low += error - k * _LN2_3
-    r, low = sum_of(high, low)
+    r, low = two_sum(high, low)
     z = r * r
     series = 0.16666666666666669 + r * (
         0.041666666666666664 + r * (0.008333333333329793 + r * (0.001388888888888636 + r * (
@@ -282,13 +285,13 @@ def _exponential(x: float) -> tuple[float, float, int]:
             )))
         )))
     )  # fmt: skip
-    high, error = sum_of(r, 0.5 * z)
+    high, error = two_sum(r, 0.5 * z)
     return high, error + (z * r * series + low * (1.0 + r)), k
 
 
 @kernel
 def exp(x: float) -> float:
-    """The exponential function."""
+    """Return the exponential function."""
     if math.isnan(x):
         return math.nan
     if x > 709.782712893384:
@@ -296,7 +299,7 @@ def exp(x: float) -> float:
     if x < -745.2:
         return 0.0
     high, low, k = _exponential(x)
-    value, error = sum_of(1.0, high)
+    value, error = two_sum(1.0, high)
     value += error + low
     half = k // 2
     return value * _power_of_two(half) * _power_of_two(k - half)
@@ -313,14 +316,15 @@ def expm1(x: float) -> float:
     if k == 0:
         return high + low
     power = _power_of_two(k)
-    value, error = sum_of(1.0, high)
-    difference, rest = sum_of(power * value, -1.0)
+    value, error = two_sum(1.0, high)
+    difference, rest = two_sum(power * value, -1.0)
     return difference + (rest + power * (error + low))
 
 
 @kernel
 def tanh(x: float) -> float:
-    """The hyperbolic tangent: 1 - 2 / (e^2x + 1), and (e^2x - 1) / (e^2x + 1) where it is small."""
+    """Return the hyperbolic tangent: 1 - 2 / (e^2x + 1), and (e^2x - 1) / (e^2x + 1) where it is
+    small."""
     size = abs(x)
     if math.isnan(x):
         return math.nan
@@ -331,20 +335,20 @@ def tanh(x: float) -> float:
     high, low, k = _exponential(2.0 * size)
     power = _power_of_two(k)
     # numerator power (1 + high + low) - 1, denominator power (1 + high + low) + 1
-    base, base_low = sum_of(power - 1.0, power * high)
+    base, base_low = two_sum(power - 1.0, power * high)
     base_low += power * low
-    top, top_low = sum_of(base, base_low)
-    bottom, bottom_low = sum_of(top, 2.0)
+    top, top_low = two_sum(base, base_low)
+    bottom, bottom_low = two_sum(top, 2.0)
     bottom_low += top_low
     t = top / bottom
-    product, error = product_of(t, bottom)
+    product, error = two_product(t, bottom)
     rest = ((top - product) - error + top_low - t * bottom_low) / bottom
     return math.copysign(t + rest, x)
 
 
 @kernel
 def parts_of(x: float) -> tuple[float, int]:
-    """A number above zero as ``m`` 2^k with ``m`` from sqrt(1/2) to sqrt(2)."""
+    """Split a number above zero into ``m`` 2^k with ``m`` from sqrt(1/2) to sqrt(2)."""
     k, scale = 0, 512
     if x < 2.2250738585072014e-308:
         x *= 2.0**54
@@ -365,7 +369,8 @@ def parts_of(x: float) -> tuple[float, int]:
 
 @kernel
 def log(x: float) -> float:
-    """The natural logarithm: of ``m`` 2^k as k log 2 + 2 artanh((m - 1) / (m + 1)), as in Sun's fdlibm."""
+    """Return the natural logarithm: of ``m`` 2^k as k log 2 + 2 artanh((m - 1) / (m + 1)), as in
+    Sun's fdlibm."""
     if not x > 0.0:
         return -math.inf if x == 0.0 else math.nan
     if math.isinf(x):

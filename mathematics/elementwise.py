@@ -115,7 +115,7 @@ def divide(a: Array1D, b: Array1D, out: Array1D) -> None:
 
 @kernel
 def remainder(a: Array1D, b: Array1D, out: Array1D) -> None:
-    """With the sign of ``b``, as in Python."""
+    """Compute the remainder with the sign of ``b``, as in Python."""
     for i in range(out.shape[0]):
         out[i] = _rest(a[i], b[i])
 
@@ -162,7 +162,7 @@ def not_equal(a: Array1D, b: Array1D, out: Array1D) -> None:
 
 @kernel
 def choose(condition: Array1D, a: Array1D, b: Array1D, out: Array1D) -> None:
-    """``a`` where the condition is not zero, else ``b``."""
+    """Choose ``a`` where the condition is not zero, else ``b``."""
     for i in range(out.shape[0]):
         out[i] = a[i] if condition[i] != 0.0 else b[i]
 
@@ -177,17 +177,6 @@ def absolute(a: Array1D, out: Array1D) -> None:
 def sign(a: Array1D, out: Array1D) -> None:
     for i in range(out.shape[0]):
         out[i] = math.copysign(1.0, a[i]) if a[i] != 0.0 else 0.0
-
-
-@kernel
-def reciprocal(a: Array1D, out: Array1D) -> None:
-    for i in range(out.shape[0]):
-        out[i] = _divided(1.0, a[i])
-
-
-@kernel
-def square(a: Array1D, out: Array1D) -> None:
-    out[:] = a * a
 
 
 @kernel
@@ -304,16 +293,15 @@ def round_up(a: Array1D, out: Array1D) -> None:
 
 @kernel
 def nearest(a: Array1D, out: Array1D) -> None:
-    """The nearest whole number, of two the even one."""
+    """Round to the nearest whole number, of two to the even one."""
     np.rint(a, out)
 
 
 FUNCTIONS: Mapping[str, Any] = {
-    "abs": absolute, "sign": sign, "negative": negative, "reciprocal": reciprocal, "square": square,
-    "sqrt": square_root, "exp": exponential, "log": logarithm, "log10": logarithm_10, "sin": sine,
-    "cos": cosine, "tan": tangent, "asin": arc_sine, "acos": arc_cosine, "atan": arc_tangent,
-    "sinh": hyperbolic_sine, "cosh": hyperbolic_cosine, "tanh": hyperbolic_tangent, "floor": round_down,
-    "ceil": round_up, "round": nearest,
+    "abs": absolute, "sign": sign, "sqrt": square_root, "exp": exponential, "log": logarithm,
+    "log10": logarithm_10, "sin": sine, "cos": cosine, "tan": tangent, "asin": arc_sine,
+    "acos": arc_cosine, "atan": arc_tangent, "sinh": hyperbolic_sine, "cosh": hyperbolic_cosine,
+    "tanh": hyperbolic_tangent, "floor": round_down, "ceil": round_up, "round": nearest,
 }  # fmt: skip
 """Functions of one array, by name."""
 OF_TWO: Mapping[str, Any] = {"atan2": angle, "min": least, "max": greatest, "hypot": hypotenuse}

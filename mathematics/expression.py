@@ -19,10 +19,7 @@ from . import elementwise
 from .arrays import Array
 from .compiling.kernel_call import KernelCall
 
-CALLABLE = (
-    "abs", "sign", "sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "tanh",
-    "floor", "ceil", "min", "max", "hypot",
-)  # fmt: skip
+CALLABLE = (*elementwise.FUNCTIONS, *elementwise.OF_TWO)
 """The functions that an expression may call."""
 CONSTANTS = {"pi": math.pi}
 _OPERATORS: Mapping[type[ast.AST], Any] = {
@@ -43,7 +40,7 @@ class ParsedExpression:
     names: tuple[str, ...]
 
     def calls(self, variables: Mapping[str, Array], out: Array) -> list[KernelCall]:
-        """The calls that write the expression's value into an array (n,), in their order.
+        """Return the calls that write the expression's value into an array (n,), in their order.
 
         ``variables`` are arrays of that size, which are read at every call.
         """
@@ -53,10 +50,10 @@ class ParsedExpression:
 
 
 def parse_expression(text: str, known: Iterable[str]) -> ParsedExpression:
-    """The expression that ``text`` says, in which the names ``known`` may occur.
+    """Parse the expression ``text``, in which the names ``known`` may occur.
 
     Raises:
-        ValueError: it cannot be read, or holds something that is not allowed; the text says what.
+        ValueError: it cannot be read, or holds something that is not allowed; the text names it.
     """
     try:
         tree = ast.parse(text.strip(), mode="eval").body

@@ -69,7 +69,7 @@ def inv_left_jacobian_so3(phi: Array1D, vector: Array1D, out: Array1D) -> None:
 
 @kernel
 def exponential(tangent: Array1D, orientation: Array1D, vectors: Array2D) -> None:
-    """The exponential map: the group element of a tangent vector (3 + 3 m).
+    """Compute the exponential map: the group element of a tangent vector (3 + 3 m).
 
     The result is written to ``orientation`` (4,) and ``vectors`` (m, 3).
     """
@@ -80,7 +80,8 @@ def exponential(tangent: Array1D, orientation: Array1D, vectors: Array2D) -> Non
 
 @kernel
 def logarithm(orientation: Array1D, vectors: Array2D, tangent: Array1D) -> None:
-    """The logarithm: the tangent vector (3 + 3 m) of a group element; its angle is at most pi."""
+    """Compute the logarithm: the tangent vector (3 + 3 m) of a group element; its angle is at most
+    pi."""
     rotation_logarithm(orientation, tangent)
     for k in range(vectors.shape[0]):
         inv_left_jacobian_so3(tangent, vectors[k], tangent[3 * k + 3 : 3 * k + 6])

@@ -38,7 +38,7 @@ class Surface(NamedTuple):
 
 @kernel
 def height_of_slope(box: Array1D, x: float, y: float, normal: Vector3) -> float:
-    """The height at which a vertical line enters a leaning box from above.
+    """Return the height at which a vertical line enters a leaning box from above.
 
     Args:
         box: a row of ``Surface.slopes``, (15,).
@@ -69,7 +69,7 @@ def height_of_slope(box: Array1D, x: float, y: float, normal: Vector3) -> float:
 
 @kernel
 def height_of_field(field: Array1D, heights: Array1D, x: float, y: float, normal: Vector3) -> float:
-    """The height of a height field, whose cells are two triangles each.
+    """Return the height of a height field, whose cells are two triangles each.
 
     The edge between the triangles goes from a cell's corner of least x and y to the opposite one.
 
@@ -99,7 +99,8 @@ def height_of_field(field: Array1D, heights: Array1D, x: float, y: float, normal
 
 @kernel
 def height_of_ground(surface: Surface, x: float, y: float, normal: Vector3) -> float:
-    """The height [m] of the highest surface at a place; ``normal`` becomes its normal, (3,)."""
+    """Return the height [m] of the highest surface at a place; ``normal`` becomes its normal,
+    (3,)."""
     height = surface.floor[0]
     for box in range(surface.boxes.shape[0]):
         inside = (

@@ -94,7 +94,8 @@ def correct_tilt_from_gravity(
 
 @kernel
 def orientation_from_gravity(specific_force: Array1D, orientation: Array1D) -> None:
-    """The orientation, with no rotation about the vertical, whose specific force points upwards."""
+    """Compute the orientation, with no rotation about the vertical, whose specific force points
+    upwards."""
     x, y, z = specific_force[0], specific_force[1], specific_force[2]
     size = math.sqrt(x * x + y * y + z * z)
     orientation[0] = orientation[1] = orientation[2] = 0.0
@@ -117,7 +118,8 @@ def misalignment(
     out: Array1D,
     place: Array1D,
 ) -> bool:
-    """The rotation (3,) [rad, world] that brings all points to the ground and ``forward`` to x.
+    """Compute the rotation (3,) [rad, world] that brings all points to the ground and ``forward``
+    to x.
 
     A small rotation (a, b) about the world's x and y axes changes the height of a point at (x, y)
     relative to the points' mean by a y - b x; a and b are the least-squares solution over all
@@ -179,9 +181,9 @@ class StandingPoints(NamedTuple):
     """The contact points in world coordinates.
 
     ``places`` (n, 3) are their positions relative to the base's origin [m], and ``rates`` (n, 3)
-    their velocities [m/s] due to the base's rotation and the joints' motion. ``active`` (n,) says
-    which are in contact, and ``weights`` (n,) how far each is trusted. ``anchors`` (n, 3) are the
-    positions where they stand [m, world], and ``anchored`` (n,) says which points have one.
+    their velocities [m/s] due to the base's rotation and the joints' motion. ``active`` (n,) marks
+    those in contact, and ``weights`` (n,) are their weights. ``anchors`` (n, 3) are the positions
+    where they stand [m, world], and ``anchored`` (n,) marks the points that have one.
     """
 
     places: Rows3

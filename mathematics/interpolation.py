@@ -13,7 +13,8 @@ from .kernel import kernel
 
 @kernel
 def interval(points: Array1D, start: int, count: int, at: float) -> int:
-    """The place of the interval, from 0 to count - 2, in which ``at`` lies; the outer ones go on.
+    """Return the place of the interval, from 0 to count - 2, in which ``at`` lies; the outer ones
+    go on.
 
     The rising points are ``points[start]`` to ``points[start + count - 1]``, at least two.
     """
@@ -29,7 +30,8 @@ def interval(points: Array1D, start: int, count: int, at: float) -> int:
 
 @kernel
 def interpolate(points: Array1D, values: Array1D, at: float, clamp: bool) -> float:
-    """The value at ``at`` of the line through (points, values); both (k), points rising, k >= 2.
+    """Return the value at ``at`` of the line through (points, values); both (k), points rising, k
+    >= 2.
 
     Beyond the ends the outer values hold (``clamp``), or the outer lines go on.
     """
@@ -51,7 +53,7 @@ def interpolate_grid(
     places: Indices1D,
     shares: Array1D,
 ) -> float:
-    """The multilinear value at ``at`` (d) of a table on a grid of d dimensions.
+    """Return the multilinear value at ``at`` (d) of a table on a grid of d dimensions.
 
     ``points`` are the rising points of all axes one behind the other, ``counts`` (d) how many each
     has, at least two; ``values`` is the table in row-major order, flat. ``places`` (d) and
@@ -90,17 +92,17 @@ class Quintic:
     coefficients: tuple[float, ...]
 
     def position(self, time: float) -> float:
-        """The value of the polynomial at ``time``."""
+        """Return the value of the polynomial at ``time``."""
         a, b, c, d, e, f = self.coefficients
         return a + time * (b + time * (c + time * (d + time * (e + time * f))))
 
     def velocity(self, time: float) -> float:
-        """The first derivative at ``time``."""
+        """Return the first derivative at ``time``."""
         _, b, c, d, e, f = self.coefficients
         return b + time * (2 * c + time * (3 * d + time * (4 * e + time * 5 * f)))
 
     def acceleration(self, time: float) -> float:
-        """The second derivative at ``time``."""
+        """Return the second derivative at ``time``."""
         _, _, c, d, e, f = self.coefficients
         return 2 * c + time * (6 * d + time * (12 * e + time * 20 * f))
 
@@ -108,7 +110,7 @@ class Quintic:
 def quintic(
     duration: float, start: tuple[float, float, float], end: tuple[float, float, float]
 ) -> Quintic:
-    """The quintic from position, velocity and acceleration at 0 to those at ``duration``."""
+    """Return the quintic from position, velocity and acceleration at 0 to those at ``duration``."""
     t = duration
     matrix = np.array(
         [
@@ -125,7 +127,8 @@ def quintic(
 
 @kernel
 def minimum_jerk(share: float) -> tuple[float, float, float]:
-    """The minimum-jerk motion from 0 to 1: its value and two derivatives after a ``share`` u.
+    """Return the minimum-jerk motion from 0 to 1: its value and two derivatives after a ``share``
+    u.
 
     The motion 10 u^3 - 15 u^4 + 6 u^5 begins and ends at rest. A ``share`` outside of 0 to 1 gives
     the state at the nearer end.

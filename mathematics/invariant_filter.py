@@ -47,7 +47,8 @@ from .linear_algebra import (
 
 @kernel
 def error_transition(gravity: float, period: float, transition: Array2D) -> None:
-    """The constant part of the transition matrix F (n, n): the exponential of the equation above.
+    """Compute the constant part of the transition matrix F (n, n): the exponential of the equation
+    above.
 
     ``gravity`` is in m/s^2, ``period`` in s.
     """
@@ -71,7 +72,8 @@ def input_jacobian(
     period: float,
     reach: Array2D,
 ) -> None:
-    """The effect of a constant IMU error on the state's error over one period: ``reach`` (n, 6).
+    """Compute the effect of a constant IMU error on the state's error over one period: ``reach``
+    (n, 6).
 
     The columns of ``reach`` are for angular velocity [rad/s, body] and specific force [m/s^2,
     body]. The matrix is minus the adjoint of the estimate, integrated to second order.
@@ -143,7 +145,7 @@ def propagate_covariance(
 
 @kernel
 def vector_deviation(covariance: Array2D, first: int, vector: Vector3) -> float:
-    """The standard deviation of the length of a vector's error in the world.
+    """Return the standard deviation of the length of a vector's error in the world.
 
     The error of a vector u is xi_u plus the effect of the rotation error: xi_u + xi_R x u.
 
@@ -166,7 +168,8 @@ def vector_deviation(covariance: Array2D, first: int, vector: Vector3) -> float:
 def sample_deviations(
     reading: Vector3, limit: float, noise: float, doubt: float, run: Indices1D, out: Vector3
 ) -> bool:
-    """The standard deviations of a sample's axes, (3,); returns whether an axis is saturated.
+    """Compute the standard deviations of a sample's axes, (3,); return whether an axis is
+    saturated.
 
     The error of a saturated axis is nearly the same in consecutive samples. So over n samples it
     grows in proportion to n, not to the square root of n as independent noise does.
@@ -201,7 +204,7 @@ def remove_contact(point: int, covariance: Array2D) -> None:
 
 @kernel
 def place_jacobian(world_jacobian: Array2D, offsets: int, jacobian: Array2D) -> None:
-    """The measurement Jacobian H (3, n) of a point's position by leg kinematics.
+    """Compute the measurement Jacobian H (3, n) of a point's position by leg kinematics.
 
     The columns of the point itself are left to ``measurement_jacobian``.
 
@@ -252,7 +255,7 @@ def add_contact(
 
 @kernel
 def innovation(point: int, world_point: Vector3, vectors: Rows3, residual: Vector3) -> None:
-    """The innovation (3,) [m] of a point: its measured position minus its estimated one.
+    """Compute the innovation (3,) [m] of a point: its measured position minus its estimated one.
 
     Args:
         world_point: the measurement, from the base to the point, R h [m, world], (3,).
@@ -298,7 +301,7 @@ def height_row(
 
 @kernel
 def world_definition_jacobian(levers: Array2D, vectors: Rows3, jacobian: Array2D) -> None:
-    """The measurement Jacobian H (3, n) of the world frame's definition by the feet.
+    """Compute the measurement Jacobian H (3, n) of the world frame's definition by the feet.
 
     The first two rows put the world's origin at the mean x and y of the points, the third puts its
     x axis in the heading of the feet. The third row is zero if all levers are zero, because such
@@ -355,7 +358,7 @@ def add_contact_noise(
 
 @kernel
 def invert(matrix: Array2D, out: Array2D) -> None:
-    """The inverse of a symmetric matrix (3, 3); zero where it has none."""
+    """Compute the inverse of a symmetric matrix (3, 3); zero where it has none."""
     a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
     d, e, f = matrix[1, 1], matrix[1, 2], matrix[2, 2]
     aa, bb, cc = d * f - e * e, c * e - b * f, b * e - c * d
@@ -371,7 +374,7 @@ def squared_distance(
     covariance: Array2D, jacobian: Array2D, noise: Matrix3, residual: Vector3,
     cross_covariance: Rows3, inverse: Matrix3, spare: Matrix3,
 ) -> float:  # fmt: skip
-    """The squared Mahalanobis distance r' S^-1 r of a residual, with S = H P H' + N.
+    """Return the squared Mahalanobis distance r' S^-1 r of a residual, with S = H P H' + N.
 
     If the model holds it is chi-squared distributed with three degrees of freedom.
 

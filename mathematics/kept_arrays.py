@@ -23,19 +23,19 @@ from numpy.typing import NDArray
 Arrays = Mapping[str, NDArray[Any]]
 
 MOST_FILES = 256
-"""How many results are kept; beyond that those go that were used longest ago."""
+"""Number of results that are kept; beyond it, the least recently used are deleted."""
 
 _MARK = "array "
 
 
 def kept_folder() -> Path:
-    """Where results are kept: ``aloft/arrays`` in the user's cache folder."""
+    """Return the folder of kept results: ``aloft/arrays`` in the user's cache folder."""
     root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(root) / "aloft" / "arrays"
 
 
 def kept_arrays(decided_by: bytes, compute: Callable[[], Arrays]) -> Arrays:
-    """The arrays that ``compute`` gives, computed only if they are not kept.
+    """Return the arrays that ``compute`` gives, computed only if they are not kept.
 
     Args:
         decided_by: everything on which the arrays depend, or a digest of it: the data and, as
@@ -53,7 +53,8 @@ def kept_arrays(decided_by: bytes, compute: Callable[[], Arrays]) -> Arrays:
 
 @cache
 def processor() -> bytes:
-    """What NumPy and its BLAS choose their routines by, which do not all round alike."""
+    """Describe the processor as NumPy and its BLAS see it when they choose routines, which do not
+    all round alike."""
     known: Any = {}
     with suppress(ImportError, AttributeError):
         known = import_module("numpy._core._multiarray_umath").__cpu_features__
@@ -62,7 +63,7 @@ def processor() -> bytes:
 
 
 def _read(place: Path) -> Arrays | None:
-    """What is kept in a file; ``None`` where there is none, or it is damaged."""
+    """Read the arrays kept in a file; ``None`` where there is none, or it is damaged."""
     try:
         with np.load(place, allow_pickle=False) as file:
             found = {name.removeprefix(_MARK): file[name] for name in file.files}
@@ -90,13 +91,13 @@ def _write(place: Path, arrays: Arrays) -> None:
 
 
 LIBRARIES = ("numpy", "pin")
-"""What computes, beside this package."""
+"""Libraries that compute, beside this package."""
 
 
 @cache
 def code_digest(*folders: str) -> bytes:
-    """A digest of all source files in these folders of the package, such as ``planner/models``, and
-    of the versions of the libraries that compute."""
+    """Hash all source files in these folders of the package, such as ``planner/models``, and the
+    versions of the libraries that compute."""
     root, digest = Path(__file__).parents[1], hashlib.blake2b(digest_size=16)
     for folder in folders:
         for path in sorted((root / folder).rglob("*.py")):

@@ -51,10 +51,10 @@ def kernel(function: _Function) -> _Function:
 
 
 def expand(function: Any) -> None:
-    """Let a kernel have loops in place of equations, if that has not been done.
+    """Replace the equations of a kernel by loops, if that has not been done.
 
     Raises:
-        EquationError: a statement cannot be rewritten; the text says where and why.
+        EquationError: a statement cannot be rewritten; the text gives place and reason.
     """
     if id(function) not in _expanded and is_kernel(function) and function.__closure__ is None:
         code = written_code(function)
@@ -67,7 +67,7 @@ def expand(function: Any) -> None:
 
 
 def _takes_numbers_only(function: FunctionType) -> bool:
-    """Whether a kernel has no arrays, and so no equations."""
+    """Return whether a kernel has no arrays, and so no equations."""
     kinds = [function.__annotations__.get(name) for name in arguments_of(function)]
     return bool(kinds) and all(kind in ("float", "int", "bool") for kind in kinds)
 

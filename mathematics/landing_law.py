@@ -1,4 +1,5 @@
-"""Where feet land after a flight: the landing law of the paper (IV), and how the body turns while the legs move.
+"""Landing places of feet after a flight: the landing law of the paper (IV), and the turning of the
+body while the legs move.
 
 Without contact the angular momentum k about the centre of mass c is constant, so whatever the legs
 do the body turns against it. With the base's angular velocity w in its own axes, joint velocities
@@ -7,11 +8,11 @@ q', and the centroidal momentum matrix A,
     k = A_kw w + A_kq q'          so  w = W k - B q',               W = A_kw^-1, B = W A_kq
     p_i' - c' = D_i w + E_i q'    so  p_i' - c' = D_i W k + G_i q',  G_i = E_i - D_i B
 
-where p_i is a contact point, D_i = J_i,w - A_lw / m and E_i = J_i,q - A_lq / m. G is the generalised
-Jacobian of robots that float in space. It says by which joint motion the feet go where they should,
-and thus how far the base turns on the way. BRUCE's legs are two thirds of its mass: feet that keep
-their place in the world move by 33 mm in the base for every 0.1 rad that the base turns, and that
-turns it by 0.07 rad more.
+where p_i is a contact point, D_i = J_i,w - A_lw / m and E_i = J_i,q - A_lq / m. G is the
+generalised Jacobian of robots that float in space. It gives the joint motion that moves the feet
+where they should go, and thus how far the base turns on the way. BRUCE's legs are two thirds of its
+mass: feet that keep their place in the world move by 33 mm in the base for every 0.1 rad that the
+base turns, and that turns it by 0.07 rad more.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def landing_place(
     centre: Array1D,
     out: Array1D,
 ) -> None:
-    """The paper's law (IV): the landing place (3,) from the nominal one (3,); z is unchanged.
+    """Apply the paper's law (IV): the landing place (3,) from the nominal one (3,); z is unchanged.
 
     Args:
         side: 1 for a foot on the left, -1 on the right, 0 in the middle.
@@ -77,7 +78,7 @@ def pull_to_place(goal: Array1D, miss: Array1D, gain: float, width: float) -> No
 
     Args:
         goal: the shift of the feet ahead and to the left [m], (2 or more,), which is changed.
-        miss: by how much the feet miss their planned place without a shift [m], (2 or more,).
+        miss: the distance of the feet from their planned place without a shift [m], (2 or more,).
         width: the length of d at which half of ``gain`` is left [m].
     """
     x, y = goal[0] + miss[0], goal[1] + miss[1]
@@ -98,7 +99,7 @@ def turn_places(places: Array2D, angle: float, out: Array2D) -> None:
 
 @kernel
 def lowest_height(points: Array2D) -> float:
-    """The least z of points (n, 3)."""
+    """Return the least z of points (n, 3)."""
     lowest = points[0, 2]
     for i in range(1, points.shape[0]):
         lowest = min(lowest, points[i, 2])
@@ -115,7 +116,7 @@ def swing(
     out: Vector3,
     speed: Vector3,
 ) -> None:
-    """The motion of a foot from its offset at lift-off to its corrected landing place.
+    """Compute the motion of a foot from its offset at lift-off to its corrected landing place.
 
     Args:
         planned, place: the positions relative to the centre of mass [m, world] without and with the
@@ -161,7 +162,7 @@ def retraction(left: float, speed: float, duration: float) -> tuple[float, float
 
 @kernel
 def heading_matrix(angle: float, out: Array2D) -> None:
-    """The rotation about the vertical by ``angle`` [rad], (3, 3)."""
+    """Compute the rotation about the vertical by ``angle`` [rad], (3, 3)."""
     sine, cosine = sincos(angle)
     out[:, :] = 0.0
     out[0, 0] = out[1, 1] = cosine
@@ -173,7 +174,7 @@ _HELD = 1e6
 
 
 class FlightMap(NamedTuple):
-    """How the base turns, and what it takes to compute it.
+    """Map from the motion of the legs to the turning of the base, with its scratch memory.
 
     Attributes:
         drift: the base's angular velocity in world axes per angular momentum with the joints
@@ -198,7 +199,7 @@ class FlightMap(NamedTuple):
 
 
 def flight_map(n_joints: int, n_contacts: int) -> FlightMap:
-    """The memory for ``map_flight``."""
+    """Allocate the memory for ``map_flight``."""
     rows = 3 * n_contacts
     return FlightMap(
         drift=np.zeros((3, 3)),
@@ -267,7 +268,7 @@ def predict_tilt(
     goal: Vector2,
     turn: Array2D,
 ) -> None:
-    """The base's tilt at touchdown, and how shifts of the landing place change it.
+    """Predict the base's tilt at touchdown, and how shifts of the landing place change it.
 
     Args:
         tilt: the base's rotation from the planned orientation now, in world axes [rad], (3,).
@@ -275,10 +276,11 @@ def predict_tilt(
         way: how far the contact points still have to go to their planned places, as seen from the
             centre of mass [m], (3 n_contacts,).
         time: left until touchdown without a shift [s].
-        later: by how much a shift of the feet upwards delays touchdown [s/m].
-        side: 1 for contact points of a left foot, -1 of a right one, 0 in the middle, (n_contacts,).
-        goal: becomes the rotation about x and y at touchdown if the feet land as planned, (2,).
-        turn: becomes its change [rad/m] per shift of the feet ahead, to the left, apart and
+        later: delay of touchdown per shift of the feet upwards [s/m].
+        side: 1 for contact points of a left foot, -1 of a right one, 0 in the middle,
+            (n_contacts,). goal: becomes the rotation about x and y at touchdown if the feet land as
+            planned, (2,). turn: becomes its change [rad/m] per shift of the feet ahead, to the
+            left, apart and
             upwards, (2, 4).
     """
     for j in range(2):
@@ -304,7 +306,7 @@ def predict_tilt(
 
 
 class LandingCost(NamedTuple):
-    """What the choice of the landing place weighs up.
+    """Weights and bounds of the choice of the landing place.
 
     Attributes:
         goal: the shifts that are best for the momenta: ahead, to the left, apart [m], (3,).
@@ -324,7 +326,8 @@ class LandingCost(NamedTuple):
 def choose_shift(
     tilt: Vector2, turn: Array2D, cost: LandingCost, matrix: Array2D, shift: Vector4
 ) -> None:
-    """The ``shift`` (4,) of the feet ahead, to the left, apart and upwards [m] that costs least::
+    """Choose the ``shift`` (4,) of the feet ahead, to the left, apart and upwards [m] that costs
+    least::
 
         sum_i weight_i (shift_i - goal_i)^2 + weight_3 shift_3^2
             + sum_j weight_(4+j) (tilt_j + turn_j shift - free_j)^2   with shift_3 within the bounds
@@ -366,7 +369,7 @@ def choose_shift(
 
 @kernel
 def invert(matrix: Matrix3, out: Matrix3) -> None:
-    """The inverse of a regular matrix (3, 3), by its cofactors; zero for a singular one."""
+    """Invert a regular matrix (3, 3), by its cofactors; zero for a singular one."""
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3
         for j in range(3):

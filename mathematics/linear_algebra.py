@@ -41,7 +41,7 @@ def add_product(matrix: Array2D, vector: Array1D, out: Array1D) -> None:
 
 @kernel
 def multiply_matrices(a: Array2D, b: Array2D, out: Array2D) -> None:
-    """``a`` (l, m) times ``b`` (m, n) into ``out`` (l, n), which is another array."""
+    """Multiply ``a`` (l, m) by ``b`` (m, n) into ``out`` (l, n), which is another array."""
     for i in range(a.shape[0]):
         for j in range(b.shape[1]):
             total = 0.0
@@ -52,7 +52,7 @@ def multiply_matrices(a: Array2D, b: Array2D, out: Array2D) -> None:
 
 @kernel
 def multiply_sparse(a: Array2D, b: Array2D, out: Array2D) -> None:
-    """The same for an ``a`` with many zeros, which are left out."""
+    """Multiply as ``multiply_matrices``, leaving out the zeros of an ``a`` that has many."""
     for i in range(a.shape[0]):
         for j in range(b.shape[1]):
             out[i, j] = 0.0
@@ -65,7 +65,8 @@ def multiply_sparse(a: Array2D, b: Array2D, out: Array2D) -> None:
 
 @kernel
 def multiply_transposed(a: Array2D, b: Array2D, out: Array2D) -> None:
-    """``a`` (l, m) times the transpose of ``b`` (n, m), which has many zeros, into ``out`` (l, n)."""
+    """Multiply ``a`` (l, m) by the transpose of ``b`` (n, m), which has many zeros, into ``out``
+    (l, n)."""
     for j in range(b.shape[0]):
         for i in range(a.shape[0]):
             out[i, j] = 0.0
@@ -97,7 +98,8 @@ def make_symmetric(matrix: Array2D) -> None:
 
 @kernel
 def factorise(matrix: Array2D, smallest: float) -> bool:
-    """The Cholesky factor U of a matrix U'U, in place; only the upper half is read and written.
+    """Compute the Cholesky factor U of a matrix U'U, in place; only the upper half is read and
+    written.
 
     Returns whether all pivots are larger than ``smallest``.
     """
@@ -185,7 +187,8 @@ def solve_positive(matrix: Array2D, vector: Array1D) -> None:
 
 @kernel
 def solve_rows(matrix: Array2D, rows: Array2D) -> None:
-    """As ``solve_positive`` for several right-hand sides: each of the ``rows`` (m, n) is one."""
+    """Solve as ``solve_positive`` for several right-hand sides: each of the ``rows`` (m, n) is
+    one."""
     factorise_positive(matrix)
     for row in range(rows.shape[0]):
         substitute(matrix, rows[row])
@@ -193,7 +196,7 @@ def solve_rows(matrix: Array2D, rows: Array2D) -> None:
 
 @kernel
 def factorise_positive(matrix: Array2D) -> None:
-    """The factors of a symmetric matrix LDL' in place: D on the diagonal, L' above it.
+    """Factorise a symmetric matrix LDL' in place: D on the diagonal, L' above it.
 
     Only the lower half is read; what is left there is of no use.
     """
@@ -228,7 +231,7 @@ def substitute(factors: Array2D, vector: Array1D) -> None:
 
 
 def product(a: Array, b: Array) -> Array:
-    """The product of matrices or stacks of matrices ``a`` (..., l, m), ``b`` (..., m, n).
+    """Return the product of matrices or stacks of matrices ``a`` (..., l, m), ``b`` (..., m, n).
 
     As in NumPy a vector may take the place of either: ``a`` (m,) or ``b`` (m,).
     """
@@ -240,7 +243,7 @@ def product(a: Array, b: Array) -> Array:
 
 
 def inverse(matrix: Array) -> Array:
-    """The inverse of a square matrix (n, n) by Gauss-Jordan elimination with row pivoting.
+    """Return the inverse of a square matrix (n, n) by Gauss-Jordan elimination with row pivoting.
 
     Raises:
         ValueError: the matrix has none.

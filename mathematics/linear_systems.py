@@ -28,7 +28,8 @@ _TERMS = 20
 
 @kernel
 def matrix_exponential(matrix: Array2D, power: Array2D, scratch: Array2D, out: Array2D) -> None:
-    """The exponential of a square matrix into ``out``, by scaling and squaring of its series.
+    """Compute the exponential of a square matrix into ``out``, by scaling and squaring of its
+    series.
 
     ``power`` and ``scratch`` are scratch arrays of the same shape (n, n).
     """
@@ -63,7 +64,8 @@ def matrix_exponential(matrix: Array2D, power: Array2D, scratch: Array2D, out: A
 def discretise(
     a: Sequence[Sequence[float]], b: Sequence[Sequence[float]], period: float
 ) -> tuple[Array, Array]:
-    """The discrete A (n, n) and B (n, m) of dx/dt = a x + b u with u held over each period [s].
+    """Return the discrete A (n, n) and B (n, m) of dx/dt = a x + b u with u held over each period
+    [s].
 
     Both at once from the exponential of [[a, b], [0, 0]] times the period.
     """
@@ -79,7 +81,7 @@ def discretise(
 def controllable_form(
     numerator: Sequence[float], denominator: Sequence[float]
 ) -> tuple[Array, Array, Array, float]:
-    """A (n, n), B (n, 1), C (1, n) and D of a proper rational function in controllable form.
+    """Return A (n, n), B (n, 1), C (1, n) and D of a proper rational function in controllable form.
 
     Coefficients are those of falling powers; the denominator's first is not zero and it has at
     least two, and the numerator has no more than the denominator.

@@ -72,7 +72,8 @@ class QuadraticProgramSolver:
     def solve(
         self, p: Array, q: Array, g: Array, h: Array, a: Array, b: Array, c: Array | None = None
     ) -> Array | None:
-        """The minimiser x (n,), or ``None`` if the solver found none or failed.
+        """Solve the program and return the minimiser x (n,), or ``None`` if the solver found none
+        or failed.
 
         Args:
             c: the rows C of cones, (3 k, n); only for Clarabel.
@@ -110,7 +111,7 @@ def _daqp(options: Mapping[str, float]) -> Solve:
 
 
 def _any_solver(name: str, options: Mapping[str, float]) -> Solve:
-    """A solver that qpsolvers calls."""
+    """Make a solver that qpsolvers calls."""
     from qpsolvers import Problem, solve_problem
 
     def solve(p: Array, q: Array, g: Array, h: Array, a: Array, b: Array) -> Array | None:
@@ -121,11 +122,13 @@ def _any_solver(name: str, options: Mapping[str, float]) -> Solve:
 
 
 TOLERANCE = 1e-9
-"""Of Clarabel's gap and residuals. Much below 1e-9 it sometimes ends early, with worse answers."""
+"""Tolerance of Clarabel's gap and residuals. Much below 1e-9 it sometimes ends early, with worse
+answers."""
 INFEASIBILITY = 1e-12
-"""Of Clarabel's proof that there is no solution. At its own 1e-8 it finds proofs for programs that have one."""
+"""Tolerance of Clarabel's proof that there is no solution. At its own 1e-8 it finds proofs for
+programs that have one."""
 SOLVED = ("Solved", "AlmostSolved", "InsufficientProgress")
-"""What it may say where its answer is as good as rounding allows at that tolerance."""
+"""States in which its answer is as good as rounding allows at that tolerance."""
 
 
 class Clarabel:
@@ -150,8 +153,9 @@ class Clarabel:
         self._settings.max_threads = 1
 
     def answer(self, p: Array, q: Array, g: Array, h: Array, a: Array, b: Array, c: Array) -> Any:
-        """All that Clarabel says of the program: its ``status``, the minimiser ``x``, slacks ``s`` and
-        multipliers ``z`` of the equations, then of the inequalities, then of the cones."""
+        """Solve the program and return Clarabel's whole answer: its ``status``, the minimiser
+        ``x``, slacks ``s`` and multipliers ``z`` of the equations, then of the inequalities, then
+        of the cones."""
         matrix = self._sparse.csc_matrix(np.vstack((a, g, -c)))
         bound = np.hstack((b, h, np.zeros(len(c))))
         kinds = [
@@ -165,7 +169,8 @@ class Clarabel:
     def solve(
         self, p: Array, q: Array, g: Array, h: Array, a: Array, b: Array, c: Array | None = None
     ) -> Array | None:
-        """The minimiser x (n,), or ``None`` if the solver found none."""
+        """Solve the program and return the minimiser x (n,), or ``None`` if the solver found
+        none."""
         answer = self.answer(p, q, g, h, a, b, np.zeros((0, len(q))) if c is None else c)
         return np.asarray(answer.x) if str(answer.status) in SOLVED else None
 

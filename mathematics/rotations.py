@@ -25,7 +25,7 @@ _SMALL = 1e-8
 
 @kernel
 def skew(vector: Array1D, out: Array2D) -> None:
-    """The matrix (3, 3) whose product with b is the cross product of ``vector`` and b."""
+    """Compute the matrix (3, 3) whose product with b is the cross product of ``vector`` and b."""
     x, y, z = vector[0], vector[1], vector[2]
     out[0, 0] = out[1, 1] = out[2, 2] = 0.0
     out[0, 1], out[0, 2], out[1, 2] = -z, y, -x
@@ -49,7 +49,7 @@ def normalise(quaternion: Array1D, out: Array1D) -> None:
 
 @kernel
 def conjugate(quaternion: Array1D, out: Array1D) -> None:
-    """The inverse of a unit quaternion."""
+    """Compute the inverse of a unit quaternion."""
     w = quaternion[3]
     out[0], out[1], out[2] = -quaternion[0], -quaternion[1], -quaternion[2]
     out[3] = w
@@ -57,7 +57,8 @@ def conjugate(quaternion: Array1D, out: Array1D) -> None:
 
 @kernel
 def multiply(a: Array1D, b: Array1D, out: Array1D) -> None:
-    """The quaternion product a b, which is the rotation ``b`` followed by the rotation ``a``."""
+    """Compute the quaternion product a b, which is the rotation ``b`` followed by the rotation
+    ``a``."""
     ax, ay, az, aw = a[0], a[1], a[2], a[3]
     bx, by, bz, bw = b[0], b[1], b[2], b[3]
     out[0] = aw * bx + ax * bw + ay * bz - az * by
@@ -94,7 +95,7 @@ def rotate_components(
 
 @kernel
 def to_matrix(quaternion: Array1D, out: Array2D) -> None:
-    """The rotation matrix (3, 3) of a unit quaternion."""
+    """Compute the rotation matrix (3, 3) of a unit quaternion."""
     x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     out[0, 0] = 1.0 - 2.0 * (y * y + z * z)
     out[0, 1] = 2.0 * (x * y - w * z)
@@ -111,8 +112,8 @@ def to_matrix(quaternion: Array1D, out: Array2D) -> None:
 def rotate_about_axis(
     base: Matrix3, axis: Vector3, cosine: float, sine: float, out: Matrix3
 ) -> None:
-    """``base`` (3, 3) times the rotation about a unit ``axis`` by the angle of that cosine and sine
-    (Rodrigues' formula)."""
+    """Multiply ``base`` (3, 3) by the rotation about a unit ``axis`` by the angle of that cosine
+    and sine (Rodrigues' formula)."""
     x, y, z = axis[0], axis[1], axis[2]
     rest = 1.0 - cosine
     xx, yy, zz = cosine + x * x * rest, cosine + y * y * rest, cosine + z * z * rest
@@ -126,7 +127,7 @@ def rotate_about_axis(
 
 @kernel
 def from_matrix(matrix: Array2D, out: Array1D) -> None:
-    """The unit quaternion of a rotation matrix, with w >= 0 where w is not tiny.
+    """Compute the unit quaternion of a rotation matrix, with w >= 0 where w is not tiny.
 
     Shepperd's method: divide by the largest of the four components, so no digit is lost.
     """
@@ -153,7 +154,7 @@ def from_matrix(matrix: Array2D, out: Array1D) -> None:
 
 @kernel
 def exponential(vector: Array1D, out: Array1D) -> None:
-    """The unit quaternion of a rotation vector [rad]: axis times angle."""
+    """Compute the unit quaternion of a rotation vector [rad]: axis times angle."""
     x, y, z = vector[0], vector[1], vector[2]
     angle = math.sqrt(x * x + y * y + z * z)
     scale = 0.5 if angle < _SMALL else sin(0.5 * angle) / angle
@@ -163,7 +164,7 @@ def exponential(vector: Array1D, out: Array1D) -> None:
 
 @kernel
 def logarithm(quaternion: Array1D, out: Array1D) -> None:
-    """The rotation vector [rad] of a unit quaternion, of length at most pi."""
+    """Compute the rotation vector [rad] of a unit quaternion, of length at most pi."""
     x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     if w < 0.0:
         x, y, z, w = -x, -y, -z, -w
@@ -176,7 +177,8 @@ def logarithm(quaternion: Array1D, out: Array1D) -> None:
 def integrate(
     quaternion: Array1D, angular_velocity: Array1D, duration: float, out: Array1D
 ) -> None:
-    """The orientation after rotating at a constant body rate [rad/s] for ``duration`` [s]."""
+    """Compute the orientation after rotating at a constant body rate [rad/s] for ``duration``
+    [s]."""
     wx, wy, wz = angular_velocity[0], angular_velocity[1], angular_velocity[2]
     rate = math.sqrt(wx * wx + wy * wy + wz * wz)
     half = 0.5 * rate * duration
@@ -192,21 +194,23 @@ def integrate(
 
 @kernel
 def yaw(quaternion: Array1D) -> float:
-    """The heading [rad]: the angle about the world's z axis from its x axis to the body's."""
+    """Return the heading [rad]: the angle about the world's z axis from its x axis to the
+    body's."""
     x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     return atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
 
 
 @kernel
 def pitch_angle(quaternion: Array1D) -> float:
-    """The angle [rad] about the world's y axis from its x axis to the body's, seen in the x-z plane."""
+    """Return the angle [rad] about the world's y axis from its x axis to the body's, seen in the
+    x-z plane."""
     x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     return atan2(2.0 * (w * y - x * z), 1.0 - 2.0 * (y * y + z * z))
 
 
 @kernel
 def tilt(quaternion: Array1D) -> float:
-    """The angle [rad] between the body's z axis and the world's, from 0 to pi."""
+    """Return the angle [rad] between the body's z axis and the world's, from 0 to pi."""
     x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     # Computed from half angles, as the arc cosine of R_zz would lose half the digits at zero.
     return 2.0 * atan2(math.sqrt(x * x + y * y), math.sqrt(z * z + w * w))
@@ -214,13 +218,14 @@ def tilt(quaternion: Array1D) -> float:
 
 @kernel
 def wrap(angle: float) -> float:
-    """The equivalent angle [rad] between -pi and pi."""
+    """Wrap an angle [rad] to between -pi and pi."""
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
 
 
 @kernel
 def mean_heading(rotations: Array3D, counted: NDArray[np.bool_]) -> float:
-    """The heading [rad] of the mean x axis of the rotations (n, 3, 3) that are ``counted`` (n,)."""
+    """Return the heading [rad] of the mean x axis of the rotations (n, 3, 3) that are ``counted``
+    (n,)."""
     x = y = 0.0
     for i in range(rotations.shape[0]):
         if counted[i]:
@@ -233,7 +238,7 @@ def mean_heading(rotations: Array3D, counted: NDArray[np.bool_]) -> float:
 def pattern_turn(
     planned: Array2D, planned_middle: Array1D, points: Array2D, middle: Array1D
 ) -> float:
-    """The rotation [rad] of a pattern of points (n, 3) about the vertical, by least squares.
+    """Return the rotation [rad] of a pattern of points (n, 3) about the vertical, by least squares.
 
     Args:
         planned, planned_middle: the pattern before the rotation, and its middle (3,).
@@ -260,7 +265,7 @@ def turn_about_vertical(vector: Array1D, angle: float, out: Array1D) -> None:
 def unit(
     x: float, y: float, z: float, default_x: float, default_y: float, default_z: float
 ) -> tuple[float, float, float]:
-    """The unit vector along (x, y, z), or the default where there is no direction.
+    """Return the unit vector along (x, y, z), or the default where there is no direction.
 
     Dividing by the largest element first keeps very long and very short vectors exact.
     """
@@ -274,7 +279,7 @@ def unit(
 
 @kernel
 def from_euler(angles: Array1D, out: Array1D) -> None:
-    """The unit quaternion (4) of roll, pitch and yaw [rad]."""
+    """Compute the unit quaternion (4) of roll, pitch and yaw [rad]."""
     r, p, y = 0.5 * angles[0], 0.5 * angles[1], 0.5 * angles[2]
     cr, sr, cp, sp, cy, sy = (
         cos(r), sin(r), cos(p), sin(p), cos(y), sin(y),
@@ -329,7 +334,7 @@ def matrices_of_quaternions(quaternions: Array) -> Array:
 
 
 def quaternions_of_matrices(matrices: Array) -> Array:
-    """Unit quaternions x, y, z, w (..., 4) of rotation matrices (..., 3, 3)."""
+    """Convert rotation matrices (..., 3, 3) to unit quaternions x, y, z, w (..., 4)."""
     m = matrices
     diagonal = np.einsum("...ii->...i", m)
     trace = diagonal.sum(axis=-1)

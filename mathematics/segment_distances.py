@@ -10,13 +10,13 @@ from .kernel import kernel
 
 @kernel
 def bounded(value: float) -> float:
-    """The value within 0 and 1."""
+    """Clip the value to between 0 and 1."""
     return min(max(value, 0.0), 1.0)
 
 
 @kernel
 def segment_gap(a: Vector3, b: Vector3, c: Vector3, d: Vector3) -> float:
-    """The distance between the segments a-b and c-d.
+    """Return the distance between the segments a-b and c-d.
 
     The closest points are the crossing of the two lines where it lies in both segments, else an
     end of one of them and what is closest to it on the other.
@@ -46,7 +46,7 @@ def capsule_gaps(
     starts: Array3D, ends: Array3D, radii: Array1D,
     other_starts: Array3D, other_ends: Array3D, other_radii: Array1D, out: Array2D,
 ) -> None:  # fmt: skip
-    """The distances between some capsules and others at n instants.
+    """Compute the distances between some capsules and others at n instants.
 
     Args:
         starts, ends, radii: (n_first, n, 3) and (n_first,); the others' are (n_second, n, 3) and (n_second,).

@@ -8,7 +8,8 @@ from .kernel import kernel
 
 @kernel
 def has_contact(contact: Flags1D, foot_of_point: Indices1D, foot: int) -> bool:
-    """Whether a foot has a point in ``contact``; the arguments are those of ``find_stance_feet``."""
+    """Return whether a foot has a point in ``contact``; the arguments are those of
+    ``find_stance_feet``."""
     found = False
     for point in range(contact.shape[0]):
         found = found or (bool(contact[point]) and foot_of_point[point] == foot)
@@ -36,7 +37,7 @@ def find_stance_feet(contact: Flags1D, foot_of_point: Indices1D, stands: Flags1D
 
 @kernel
 def mean_place(points: Array2D, chosen: Flags1D, count: int, out: Array1D) -> None:
-    """The mean (3,) of the ``count`` chosen ones of points (n, 3)."""
+    """Compute the mean (3,) of the ``count`` chosen ones of points (n, 3)."""
     out[:] = 0.0
     for i in range(points.shape[0]):
         if chosen[i]:

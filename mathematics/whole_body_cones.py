@@ -106,8 +106,8 @@ def add_plane(
     program: QuadraticProgram,
     memory: ActiveSetMemory,
 ) -> None:
-    """A plane along the cone's ``direction``. Where all are in use, it takes the place of the one that
-    is not active and farthest from it."""
+    """Add a plane along the cone's ``direction``. Where all are in use, it takes the place of the
+    one that is not active and farthest from it."""
     x, y = cones.direction[point, 0], cones.direction[point, 1]
     place = cones.used[point]
     if place < PLANES:
@@ -126,7 +126,7 @@ def add_plane(
 
 
 @kernel
-def look_along(point: int, x: Array1D, cones: Cones) -> float:
+def set_force_direction(point: int, x: Array1D, cones: Cones) -> float:
     """Make a cone's ``direction`` that of its tangential force; returns the size of that [N]. At the
     apex it returns zero, and the direction stays."""
     a, b = x[3 * point], x[3 * point + 1]
@@ -138,7 +138,7 @@ def look_along(point: int, x: Array1D, cones: Cones) -> float:
 
 
 @kernel
-def cut(
+def add_violated_planes(
     count: int,
     first: int,
     friction: float,
@@ -151,7 +151,7 @@ def cut(
     """Add a plane where a force has left its cone by more than that share; returns how many."""
     added = 0
     for point in range(count):
-        size = look_along(point, x, cones)
+        size = set_force_direction(point, x, cones)
         outside = size - friction * x[3 * point + 2] > tolerance * size
         if size > 0.0 and outside:
             add_plane(point, first, friction, cones, program, memory)
@@ -160,11 +160,13 @@ def cut(
 
 
 @kernel
-def touch(count: int, friction: float, tolerance: float, cones: Cones, x: Array1D) -> None:
+def refresh_support_planes(
+    count: int, friction: float, tolerance: float, cones: Cones, x: Array1D
+) -> None:
     """Have a plane along every force that presses its cone or has left it by more than that share, and
     no other plane near it. The rows of the program are not changed."""
     for point in range(count):
-        size = look_along(point, x, cones)
+        size = set_force_direction(point, x, cones)
         outside = size - friction * x[3 * point + 2] > tolerance * size
         if size == 0.0 or not (cones.curvature[point] > 0.0 or outside):
             continue
@@ -204,7 +206,7 @@ def multiplier_curvature(
             continue
         cones.curvature[point] = cones.curvature[point] + memory.multipliers[j]
     for point in range(count):
-        size = look_along(point, x, cones)
+        size = set_force_direction(point, x, cones)
         pressure = max(cones.curvature[point], 0.0)
         cones.curvature[point] = pressure / size if size > 0.0 else 0.0
 
@@ -234,8 +236,8 @@ def add_bending(count: int, cones: Cones, x: Array1D, gradient: Array1D) -> None
 
 @kernel
 def turned(count: int, friction: float, cones: Cones, x: Array1D) -> float:
-    """How far the solution is from its cones: the largest angle [rad] between a pressed cone's
-    ``direction`` and its force, or share by which a force leaves its cone."""
+    """Return the distance of the solution from its cones: the largest angle [rad] between a pressed
+    cone's ``direction`` and its force, or share by which a force leaves its cone."""
     worst = 0.0
     for point in range(count):
         a, b = x[3 * point], x[3 * point + 1]
@@ -255,8 +257,8 @@ CUTS = 60
 STEPS = 12
 """The most Newton steps after each approach."""
 APPROACHES = 4
-"""How often planes are added again, each time until forces leave their cones by a hundredth of what they
-did before, where Newton's steps do not converge."""
+"""Number of times that planes are added again, each time until forces leave their cones by a
+hundredth of the previous share, where Newton's steps do not converge."""
 FIRST = 3e-2
 """The share by which forces may leave their cones before the first Newton step."""
 EXACT = 1e-12
@@ -338,7 +340,10 @@ def approach(
     for _ in range(CUTS):
         if code < 0:
             return code, held
-        if cut(count, first, friction, tolerance, cones, own.qp, own.memory, x) == 0:
+        if (
+            add_violated_planes(count, first, friction, tolerance, cones, own.qp, own.memory, x)
+            == 0
+        ):
             return code, held
         code, held = fulfil(n, rows, held, own.qp, own.memory, x)
     return TOO_LONG, held
@@ -360,7 +365,7 @@ def refine(
     before = 4.0
     for _ in range(STEPS):
         multiplier_curvature(count, held, first, cones, own.memory, x)
-        touch(count, friction, EXACT, cones, x)
+        refresh_support_planes(count, friction, EXACT, cones, x)
         write_planes(count, n, first, friction, cones, own.qp)
         force_program(program.weights.force[0], reduction, extra, own.qp)
         add_curvature(count, cones, own.qp.hessian)

@@ -1,4 +1,5 @@
-"""What a motion of a whole robot needs, at many instants: momentum, contact points, base acceleration and joint torques.
+"""Motion of a whole robot at many instants: momentum, contact points, base acceleration and joint
+torques.
 
 The base and the joints of a tree of bodies are given with the joints' accelerations and the contact forces. With p and n
 the force and moment that the bodies need while the base does not accelerate (``composite_inertias``), c its centre of
@@ -35,7 +36,7 @@ from .body_dynamics import (
     momentum_of,
     move_bodies,
     place_bodies,
-    place_of,
+    point_position,
     velocity_at,
 )
 from .constants import GRAVITY
@@ -64,7 +65,7 @@ class GivenMotion(NamedTuple):
 
 
 class MotionTerms(NamedTuple):
-    """What follows at n instants.
+    """Quantities that follow from the motion at n instants.
 
     ``com``, ``com_velocity`` and ``momentum``, the angular momentum about the centre of mass, (n, 3); ``inertia``
     (n, 6) about it: xx, yy, zz, xy, xz, yz; all in the world's axes. ``points`` and ``point_velocity``
@@ -95,7 +96,7 @@ class MotionMemory(NamedTuple):
 
 
 def motion_memory(n_joints: int) -> MotionMemory:
-    """The memory of a tree."""
+    """Allocate the memory of a tree."""
     return MotionMemory(
         body_motion(n_joints), inertias(n_joints), np.zeros((n_joints + 1, 6)), *np.zeros((3, 6))
     )
@@ -119,8 +120,8 @@ def evaluate_motion(
 def place_at_instants(
     tree: BodyTree, position: Array2D, motion: BodyMotion, place: Array3D, rotation: Array3D
 ) -> None:
-    """Where all bodies are at n positions (n, 7 + n_joints): their origins (n, n_bodies, 3) and their rotations to
-    the world, row by row (n, n_bodies, 9)."""
+    """Compute the places of all bodies at n positions (n, 7 + n_joints): their origins (n,
+    n_bodies, 3) and their rotations to the world, row by row (n, n_bodies, 9)."""
     for i in range(position.shape[0]):
         to_matrix(position[i, 3:7], motion.rotation[0])
         place_bodies(tree, position[i, 7:], motion)
@@ -187,7 +188,7 @@ def point_terms(
     """Places and velocities of the points in the world at instant ``i``."""
     for k in range(fixed.body.shape[0]):
         body, point = fixed.body[k], out.points[i, k]
-        place_of(motion, body, fixed.place[k], point)
+        point_position(motion, body, fixed.place[k], point)
         point[2] = point[2] - fixed.below[k]
         velocity_at(motion, body, point, out.point_velocity[i, k])
         for axis in range(3):
@@ -197,7 +198,7 @@ def point_terms(
 
 @kernel
 def solve_inertia(inertia: Array1D, vector: Vector3, out: Vector3) -> None:
-    """The (3,) for which the inertia (6,) times it is the vector (3,)."""
+    """Solve for the vector (3,) whose product with the inertia (6,) is ``vector`` (3,)."""
     xx, yy, zz = inertia[0], inertia[1], inertia[2]
     xy, xz, yz = inertia[3], inertia[4], inertia[5]
     a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
@@ -210,8 +211,8 @@ def solve_inertia(inertia: Array1D, vector: Vector3, out: Vector3) -> None:
 
 @kernel
 def base_acceleration(given: GivenMotion, i: int, memory: MotionMemory, out: MotionTerms) -> None:
-    """How the base accelerates at instant ``i``; ``memory.spatial`` is the same in the world's axes, less
-    gravity. The centre of mass becomes a place in the world."""
+    """Compute the base's acceleration at instant ``i``; ``memory.spatial`` is the same in the
+    world's axes, less gravity. The centre of mass becomes a place in the world."""
     spatial, wrench, com = memory.spatial, memory.wrench, out.com[i]
     need, mass = memory.composite.force[0], memory.composite.mass[0]
     x, y, z = com[0], com[1], com[2]
@@ -250,7 +251,8 @@ def base_acceleration(given: GivenMotion, i: int, memory: MotionMemory, out: Mot
 def joint_torques(
     tree: BodyTree, fixed: FixedPoints, given: GivenMotion, i: int, memory: MotionMemory, out: MotionTerms
 ) -> None:  # fmt: skip
-    """The torques of the joints at instant ``i``, with the base accelerating as ``memory.spatial`` says."""
+    """Compute the torques of the joints at instant ``i``, with the base accelerating as
+    ``memory.spatial``."""
     motion, composite, wrench, torque = (
         memory.motion,
         memory.composite,
@@ -311,7 +313,7 @@ class TurnMemory(NamedTuple):
 
 
 def turn_memory() -> TurnMemory:
-    """The memory of one step."""
+    """Allocate the memory of one step."""
     return TurnMemory(np.zeros((3, 3)), np.zeros(3), np.zeros(7), np.zeros(7), np.zeros((4, 7)))
 
 
@@ -319,7 +321,8 @@ def turn_memory() -> TurnMemory:
 def turn_rate(
     pushed: PushedTurns, i: int, j: int, state: Array1D, memory: TurnMemory, out: Array1D
 ) -> None:
-    """The derivative (7,) of quaternion and momentum at an instant ``i`` of stretch ``j``."""
+    """Compute the derivative (7,) of quaternion and momentum at an instant ``i`` of stretch
+    ``j``."""
     turn, body, inverse, lever = memory.turn, memory.body, pushed.inverse[i], pushed.lever[i]
     x, y, z, w = state[0], state[1], state[2], state[3]
     size = 1.0 / np.sqrt(x * x + y * y + z * z + w * w)

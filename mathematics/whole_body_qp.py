@@ -179,7 +179,7 @@ def torque_rows(
 
 @kernel
 def within_limits(torque: Array1D, motors: TorqueLimits) -> bool:
-    """Whether torques (n_joints,) [N m] keep their limits, up to 1e-10 N m."""
+    """Return whether torques (n_joints,) [N m] keep their limits, up to 1e-10 N m."""
     for motor in range(torque.shape[0]):
         total = 0.0
         for j in range(torque.shape[0]):
@@ -193,7 +193,8 @@ def within_limits(torque: Array1D, motors: TorqueLimits) -> bool:
 
 @kernel
 def limit_torques(joint_velocity: Array1D, motors: TorqueLimits) -> None:
-    """The bounds on the torques: of motors at their present speed, or of joints at any speed."""
+    """Compute the bounds on the torques: of motors at their present speed, or of joints at any
+    speed."""
     for i in range(motors.speed.shape[0]):
         if motors.kind == JOINT_LIMITS:
             motors.upper[i] = motors.peak[i] * motors.peak_share[i]
@@ -209,7 +210,7 @@ def limit_torques(joint_velocity: Array1D, motors: TorqueLimits) -> None:
 
 @kernel
 def motor_limits(motors: TorqueLimits) -> None:
-    """The bounds of each motor's torque at its speed.
+    """Compute the bounds of each motor's torque at its speed.
 
     The driving torque follows the torque-speed curve; the braking torque is ``peak`` at any speed.
     """

@@ -202,7 +202,7 @@ def eliminate(program: WholeBodyProgram, reduction: Reduction) -> bool:
 def force_program(
     force_weight: float, reduction: Reduction, extra: int, qp: QuadraticProgram
 ) -> None:
-    """The cost in f and the first ``extra`` elements of e."""
+    """Write the cost in f and the first ``extra`` elements of e."""
     hessian, gradient, size = qp.hessian, qp.gradient, 3 * reduction.n_active[0]
     K, k_0 = reduction.K, reduction.k_0
     for i in range(size + extra):
@@ -222,7 +222,7 @@ def force_program(
 def force_gradient(
     program: WholeBodyProgram, reduction: Reduction, extra: int, unknowns: Array1D, out: Array1D
 ) -> None:
-    """The gradient of the cost: w_f f + B'R^-1 (K f - k), then e; (3 n_active + extra,).
+    """Compute the gradient of the cost: w_f f + B'R^-1 (K f - k), then e; (3 n_active + extra,).
 
     It has no rounding errors along forces that do not move the base, where only w_f decides and
     K'K + w_f 1 has lost most of its digits.
@@ -315,7 +315,8 @@ def map_torques(program: WholeBodyProgram, reduction: Reduction) -> None:
 def limit_rows(
     program: WholeBodyProgram, reduction: Reduction, extra: int, qp: QuadraticProgram
 ) -> int:
-    """The rows of friction in f, and with ``extra`` unknowns e also those of torque; returns how many."""
+    """Write the rows of friction in f, and with ``extra`` unknowns e also those of torque; return
+    their number."""
     size, K, torque_map = 3 * reduction.n_active[0], reduction.K, reduction.torque_map
     n, count = size + extra, reduction.n_active[0]
     rows = friction_rows(count, n, program.weights, qp.matrix, qp.bound)
@@ -332,7 +333,8 @@ def limit_rows(
 
 @kernel
 def write_program(program: WholeBodyProgram, reduction: Reduction, whole: EqualityProgram) -> None:
-    """The program in (f, e, r); ``reduction`` is that of this tick, with a point in stance."""
+    """Write the program in (f, e, r); ``reduction`` is that of this tick, with a point in
+    stance."""
     limits, count, joints = whole.limits, reduction.n_active[0], reduction.torque_rest.shape[0]
     first = 3 * count + joints  # of r
     n = first + 6
@@ -366,14 +368,15 @@ def recover_motion(
     unknowns: Array1D,
     solution: WholeBodySolution,
 ) -> None:
-    """The accelerations and the joint torques (paper, opt_torque) for f and ``extra`` elements of e."""
+    """Compute the accelerations and the joint torques (paper, opt_torque) for f and ``extra``
+    elements of e."""
     recover_acceleration(reduction, extra, unknowns, solution.acceleration)
     recover_torque(program, reduction, solution.acceleration, unknowns, solution.torque)
 
 
 @kernel
 def recover_acceleration(reduction: Reduction, extra: int, unknowns: Array1D, out: Array1D) -> None:
-    """The acceleration a_0 + X K f + N e (n,) for ``extra`` elements of e."""
+    """Compute the acceleration a_0 + X K f + N e (n,) for ``extra`` elements of e."""
     X_t, K, N_t, size = reduction.X_t, reduction.K, reduction.N_t, 3 * reduction.n_active[0]
     out[:] = reduction.a_0
     for k in range(6):
@@ -394,7 +397,8 @@ def recover_torque(
     force: Array1D,
     torque: Array1D,
 ) -> None:
-    """The joint torques M_j a + h_j - J_j' f (n_joints,) [N m] for the forces of the points in stance."""
+    """Compute the joint torques M_j a + h_j - J_j' f (n_joints,) [N m] for the forces of the points
+    in stance."""
     terms = program.terms
     for j in range(torque.shape[0]):
         total = terms.nonlinear[6 + j]
@@ -427,6 +431,6 @@ def write_forces(
 def recover_solution(
     program: WholeBodyProgram, reduction: Reduction, unknowns: Array1D, solution: WholeBodySolution
 ) -> None:
-    """The solution of the program in (f, e, r)."""
+    """Compute the solution of the program in (f, e, r)."""
     recover_motion(program, reduction, reduction.torque_rest.shape[0], unknowns, solution)
     write_forces(SOLVED, reduction, unknowns, solution)

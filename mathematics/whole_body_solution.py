@@ -73,7 +73,8 @@ def solve_with_pyramids(
 def exceeds_limits(
     program: WholeBodyProgram, reduction: Reduction, solution: WholeBodySolution
 ) -> bool:
-    """Whether the solution's torques exceed their limits; if so, prepares the larger program."""
+    """Return whether the solution's torques exceed their limits; if so, prepare the larger
+    program."""
     if program.motors.kind == NO_LIMITS or within_limits(solution.torque, program.motors):
         return False
     free_motions(reduction)

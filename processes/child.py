@@ -1,4 +1,5 @@
-"""What runs in a ``ChildProcess``: it says when it is ready and why it fails, and ends with its parent."""
+"""Main function of a ``ChildProcess``: it reports readiness and failure, and ends with its
+parent."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from importlib import import_module
 from select import select
 
 READY = b"ready\n"
-"""What a child writes into the socket when it is ready."""
+"""Bytes that a child writes into the socket when it is ready."""
 _link = -1
 
 

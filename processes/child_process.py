@@ -1,13 +1,14 @@
 """Starts, watches and ends a process beside this one.
 
-    with ChildProcess("the solver", "aloft.planner.solving.solver_process:serve", stdout=True) as child:
+    with ChildProcess("the solver", "aloft.planner.solving.solver_process:serve", stdout=True) as
+    child:
         child.wait_until_ready(10.0)
         child.stdin.write(...)
 
 A child is a fresh interpreter, never a copy of this process: a copy would share its robot's ports, and
 in a process with several threads it may find a lock that another thread held.
 
-A socket joins the two. Through it the child says that it is ready, and which exception ended it; and
+A socket joins the two. Through it the child reports that it is ready, and which exception ended it; and
 its end tells the parent at once that the child has died. When the parent has died, whatever killed
 it, the kernel sends the child a signal, which ends it even in the middle of compiled code.
 (``PR_SET_PDEATHSIG`` fires too early: when the *thread* that started the child ends.) A child that
@@ -123,7 +124,8 @@ class ChildProcess:
         return self._process.pid
 
     def is_alive(self) -> bool:
-        """Whether it is running, as a child of this process and not of one that this is a copy of."""
+        """Return whether the process runs as a child of this very process, not of one that was
+        forked."""
         return self._owner == os.getpid() and self._process.poll() is None
 
     def send_signal(self, number: int) -> None:
@@ -151,7 +153,7 @@ class ChildProcess:
                 raise self.failure()
 
     def failure(self) -> ChildError:
-        """Why it has died: its exception, or its exit code."""
+        """Return the cause of its death: its exception, or its exit code."""
         end = monotonic() + KILL_TIME
         while (left := end - monotonic()) > 0 and self._listen(left):
             pass
@@ -186,7 +188,7 @@ class ChildProcess:
         return code
 
     def _listen(self, seconds: float) -> bool:
-        """Read what it says within that time. Returns false when it can say no more."""
+        """Read its messages within that time; return false when no more can come."""
         if not select([self._socket], [], [], seconds)[0]:
             return True
         try:

@@ -22,7 +22,7 @@ from ..mathematics.body_dynamics import (
     body_motion,
     move_bodies,
     place_bodies,
-    place_of,
+    point_position,
     velocity_at,
 )
 from ..mathematics.kernel import kernel
@@ -95,13 +95,13 @@ def contact_motion(
     for i in range(contacts.foot.shape[0]):
         body = contacts.body[contacts.foot[i]]
         point = out.points[i]
-        place_of(motion, body, contacts.centre[i], point)
+        point_position(motion, body, contacts.centre[i], point)
         point[:] = point + contacts.radius[i] * down
         velocity_at(motion, body, point, out.rates[i])
     out.forward[:] = 0.0
     for foot in range(contacts.body.shape[0]):
         body, ball = contacts.body[foot], contacts.ball[foot]
-        place_of(motion, body, contacts.sole[foot], out.soles[foot])
+        point_position(motion, body, contacts.sole[foot], out.soles[foot])
         for k in range(3):
             out.forward[k] = out.forward[k] + motion.rotation[body, k, 0]
             if ball >= 0:
@@ -141,7 +141,7 @@ def relative_com_velocity(bodies: RigidBodies, out: Vector3) -> None:
     out[0] = out[1] = out[2] = 0.0
     for body in range(tree.mass.shape[0]):
         mass = tree.mass[body]
-        place_of(motion, body, tree.com[body], place)
+        point_position(motion, body, tree.com[body], place)
         velocity_at(motion, body, place, velocity)
         total += mass
         out[:] = out + mass * velocity
@@ -158,7 +158,7 @@ def differentiate_contacts(
     for i in range(contacts.foot.shape[0]):
         body = contacts.body[contacts.foot[i]]
         centre, jacobian = centres[i], jacobians[i]
-        place_of(bodies.motion, body, contacts.centre[i], centre)
+        point_position(bodies.motion, body, contacts.centre[i], centre)
         for k in range(jacobian.shape[1]):
             jacobian[0, k] = jacobian[1, k] = jacobian[2, k] = 0.0
         x, y, z = centre[0], centre[1], centre[2]

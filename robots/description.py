@@ -11,9 +11,9 @@ from ..files.document import read_file
 from ..files.nodes import MapNode, plain
 from ..files.problems import Code, Problem, Problems
 from ..files.validation import locate
+from .element import Vector3
 from .importing.package_files import SCHEME, find_file, package_of
 from .importing.xacro_text import XACRO
-from .part import Vector3
 from .plausible_size import wrong_size
 from .robot_description import (
     BASE_VELOCITIES,
@@ -31,10 +31,10 @@ from .robot_description import (
     Sensors,
     Thruster,
     Transmission,
-    TurnedPart,
+    TurnedShape,
 )
 from .shapes import Capsule, Hull, Shape
-from .validation import RobotError, RobotFault, find_faults
+from .validation import DescriptionError, RobotError, find_errors
 
 if TYPE_CHECKING:
     from .importing.description_data import Imported
@@ -66,16 +66,16 @@ class ReadRobot:
 
 
 @dataclass(frozen=True)
-class PlacedYaml:
+class LocatedYaml:
     """A robot's YAML as plain ``data``, none where it is empty, with the line and column of every value,
-    and the ``faults`` of the YAML alone."""
+    and the ``errors`` of the YAML alone."""
 
     data: Any
     tree: MapNode
-    faults: tuple[RobotFault, ...]
+    errors: tuple[DescriptionError, ...]
 
     @classmethod
-    def read(cls, path: Path) -> PlacedYaml:
+    def read(cls, path: Path) -> LocatedYaml:
         """Return the file's content.
 
         Raises:
@@ -83,14 +83,15 @@ class PlacedYaml:
         """
         problems = Problems()
         tree = read_file(path, str(path), problems, _KIND, may_be_empty=True)
-        faults = tuple(map(_yaml_fault, problems.report(str(path)).problems))
+        errors = tuple(map(_yaml_error, problems.report(str(path)).problems))
         if tree is None:
-            raise RobotError(str(path), faults)
-        return cls(plain(tree) if tree.entries else None, tree, faults)
+            raise RobotError(str(path), errors)
+        return cls(plain(tree) if tree.entries else None, tree, errors)
 
     def place(self, path: tuple[str | int, ...]) -> tuple[int, int]:
-        """Line and column of the value at a path, or of the nearest thing that holds it; (0, 0)
-        where the file holds nothing of it."""
+        """Return the line and column of the value at a path, or of the nearest thing that holds it; (0, 0) where the
+        file holds nothing of it.
+        """
         steps, node, _ = locate(self.tree, path)
         if not self.tree.entries or (path and not steps):
             return (0, 0)
@@ -100,22 +101,22 @@ class PlacedYaml:
         """Check whether the file has an entry at that path."""
         return len(locate(self.tree, path)[0]) == len(path)
 
-    def placed(self, fault: RobotFault) -> RobotFault:
+    def placed(self, description_error: DescriptionError) -> DescriptionError:
         """Return the same fault with its line and column."""
-        if fault.line:
-            return fault
-        line, column = self.place(fault.path)
+        if description_error.line:
+            return description_error
+        line, column = self.place(description_error.path)
         if not line and self.tree.entries:
             line, column = self.tree.where.line, self.tree.where.column
-        return replace(fault, line=line, column=column)
+        return replace(description_error, line=line, column=column)
 
 
-def _yaml_fault(problem: Problem) -> RobotFault:
+def _yaml_error(problem: Problem) -> DescriptionError:
     """Return a problem of the YAML as a fault of the robot."""
     where, message = problem.where, problem.message
     if problem.code is Code.YAML:
         message = f"this is no YAML: {message}"
-    return RobotFault(
+    return DescriptionError(
         (), message, problem.expected, problem.found, problem.fix, where.line, where.column
     )
 
@@ -161,26 +162,28 @@ def read(path: Path) -> ReadRobot:
     """
     if path.suffix in OTHER_FORMATS:
         what = f"files in {path.suffix.removeprefix('.').upper()} are not read"
-        fault = RobotFault(
+        description_error = DescriptionError(
             (), what, "a URDF, MJCF or YAML file", path.suffix, OTHER_FORMATS[path.suffix]
         )
-        raise RobotError(str(path), [fault])
+        raise RobotError(str(path), [description_error])
     if path.suffix in MODEL_FILES:
         beside = next((p for s in YAML_FILES if (p := path.with_suffix(s)).is_file()), None)
-        return _read_model(path, beside, PlacedYaml.read(beside) if beside else None)
-    text = PlacedYaml.read(path)
+        return _read_model(path, beside, LocatedYaml.read(beside) if beside else None)
+    text = LocatedYaml.read(path)
     if isinstance(text.data, dict) and "file" in text.data:
         return _read_model(_named_file(path, text), path, text)
     data = text.data
     _complete(data)
-    faults = [*text.faults, *find_faults(data)]
-    if faults:
-        raise RobotError(str(path), [text.placed(fault) for fault in faults])
-    robot = _with_places(RobotDescription.model_validate(data), path.parent)
+    errors = [*text.errors, *find_errors(data)]
+    if errors:
+        raise RobotError(
+            str(path), [text.placed(description_error) for description_error in errors]
+        )
+    robot = _with_locations(RobotDescription.model_validate(data), path.parent)
     return ReadRobot(robot, path, notes=wrong_size(robot))
 
 
-def _named_file(path: Path, text: PlacedYaml) -> Path:
+def _named_file(path: Path, text: LocatedYaml) -> Path:
     """Return the URDF or MJCF file that a YAML names. Raises ``RobotError`` where it is not there."""
     name = text.data["file"]
     if isinstance(name, str) and name.endswith(MODEL_FILES):
@@ -200,11 +203,11 @@ def _named_file(path: Path, text: PlacedYaml) -> Path:
             "Python package brings it"
         )
         fix = f"pip install {DISTRIBUTIONS.get(package, package)}"
-    fault = RobotFault(("file",), message, expected, str(name), fix)
-    raise RobotError(str(path), [text.placed(fault)])
+    description_error = DescriptionError(("file",), message, expected, str(name), fix)
+    raise RobotError(str(path), [text.placed(description_error)])
 
 
-def _read_model(path: Path, added: Path | None, text: PlacedYaml | None) -> ReadRobot:
+def _read_model(path: Path, added: Path | None, text: LocatedYaml | None) -> ReadRobot:
     from .importing.description_data import import_robot, written_path
     from .importing.fit_to_ground import fit_to_ground
 
@@ -216,22 +219,22 @@ def _read_model(path: Path, added: Path | None, text: PlacedYaml | None) -> Read
 
         content, guessed = guess(imported)
         imported = import_robot(path, content)
-    faults = [*(text.faults if text else ()), *imported.faults]
+    errors = [*(text.errors if text else ()), *imported.errors]
     # A fault of the YAML's own keys also shows in what is made of them: once is enough.
-    own = {fault.path[:2] for fault in faults}
-    found = find_faults(imported.data)
-    faults += [f for f in found if written_path(f, imported.data)[:2] not in own]
-    if faults:
-        placed = [_placed(fault, imported, text) for fault in faults]
+    own = {description_error.path[:2] for description_error in errors}
+    found = find_errors(imported.data)
+    errors += [f for f in found if written_path(f, imported.data)[:2] not in own]
+    if errors:
+        placed = [_placed(description_error, imported, text) for description_error in errors]
         raise RobotError(str(added or path), placed)
     robot = RobotDescription.model_validate(imported.data)
-    robot = _with_places(robot, (added or path).parent)
+    robot = _with_locations(robot, (added or path).parent)
     robot, more = fit_to_ground(robot, "standing" in content, imported.model.pose)
     notes = (*guessed, *imported.notes, *more, *wrong_size(robot))
     return ReadRobot(robot, added or path, path, notes)
 
 
-def _with_places(robot: RobotDescription, folder: Path) -> RobotDescription:
+def _with_locations(robot: RobotDescription, folder: Path) -> RobotDescription:
     """Return the robot with meshes that are found from anywhere; a description in ``folder`` names them."""
     if not robot.looks:
         return robot
@@ -251,17 +254,19 @@ def _with_places(robot: RobotDescription, folder: Path) -> RobotDescription:
     return robot.changed(looks=looks)
 
 
-def _placed(fault: RobotFault, imported: Imported, added: PlacedYaml | None) -> RobotFault:
+def _placed(
+    description_error: DescriptionError, imported: Imported, added: LocatedYaml | None
+) -> DescriptionError:
     """Return the fault with its place: in the YAML where that sets the value, else in the URDF or MJCF file."""
-    from .importing.description_data import placed_in_model, written_path
+    from .importing.description_data import located_in_model, written_path
 
-    path = written_path(fault, imported.data)
+    path = written_path(description_error, imported.data)
     if added is not None and added.holds(path):
-        return added.placed(replace(fault, path=path))
-    in_model = placed_in_model(fault, imported.data, imported.model)
+        return added.placed(replace(description_error, path=path))
+    in_model = located_in_model(description_error, imported.data, imported.model)
     if added is None or in_model.line:
         return in_model
-    return added.placed(replace(fault, path=path))
+    return added.placed(replace(description_error, path=path))
 
 
 def _complete(data: object) -> None:
@@ -296,6 +301,7 @@ __all__ = [
     "Box",
     "Capsule",
     "ContactPoint",
+    "DescriptionError",
     "Foot",
     "Hull",
     "Joint",
@@ -305,12 +311,11 @@ __all__ = [
     "Motors",
     "RobotDescription",
     "RobotError",
-    "RobotFault",
     "Sensors",
     "Shape",
     "Thruster",
     "Transmission",
-    "TurnedPart",
+    "TurnedShape",
     "Vector3",
     "find_robot",
     "read_description",

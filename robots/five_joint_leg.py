@@ -33,8 +33,9 @@ _CANONICAL = np.array([1.0, -1.0, 1.0, -1.0, -1.0])
 _FAR = 10.0
 """Targets are limited to this distance [m]: no square overflows."""
 _SLANT = 1e-3
-"""Below this sine of the angle between the foot's line and the line from hip to sole, the leg
-plane is undefined and blends into the upright one."""
+"""Sine of the angle between the foot's line and the line from hip to sole below which the leg plane is undefined and
+blends into the upright one.
+"""
 LEVEL = 1e-3
 """The least ``level`` of ``inverse``: nearer to gimbal lock the exact yaw would be noise."""
 
@@ -299,7 +300,7 @@ def _canonical(signs: Array1D, angles: Array1D) -> tuple[float, float, float, fl
 
 @kernel
 def _thigh_rotation(a: float, b: float, c: float, out: Array2D) -> None:
-    """Yaw ``a`` about z, then pitch ``b`` about -y, then roll ``c`` about x."""
+    """Compute the rotation by yaw ``a`` about z, then pitch ``b`` about -y, then roll ``c`` about x."""
     (sin_a, cos_a), (sin_b, cos_b) = sincos(a), sincos(b)
     sin_c, cos_c = sincos(c)
     out[0, 0], out[1, 0], out[2, 0] = cos_a * cos_b, sin_a * cos_b, sin_b
@@ -501,7 +502,7 @@ class VelocityScratch(NamedTuple):
 
 
 def velocity_scratch() -> VelocityScratch:
-    """Zero memory for one leg."""
+    """Return zero memory for one leg."""
     return VelocityScratch(np.zeros((6, 5)), np.zeros((3, 5)), np.zeros((5, 5)))
 
 
@@ -518,7 +519,7 @@ def inverse_velocity(
     scratch: VelocityScratch,
     out: Array1D,
 ) -> None:
-    """Joint velocities (5,) for a sole velocity and a rate of the foot's line.
+    """Compute the joint velocities (5,) for a sole velocity and a rate of the foot's line.
 
     Least squares, damped: (A'A + damping^2) out = A'b. A's rows are the sole's velocity, times
     ``length`` the two turns of the line, and times ``held length`` the hip's yaw.

@@ -197,7 +197,7 @@ def identify_rigid_body(
 
 
 class _Assembly:
-    """Makes the averaged, projected equations of a motion."""
+    """Maker of the averaged, projected equations of a motion."""
 
     def __init__(self, robot: RobotDescription, moved: NDArray[np.bool_]) -> None:
         import pinocchio as pin

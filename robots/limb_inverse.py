@@ -211,7 +211,7 @@ def limb_velocity(
     work: Array2D,
     speeds: Array1D,
 ) -> None:
-    """Joint velocities that move the foot as its target moves, by damped least squares.
+    """Compute the joint velocities that move the foot as its target moves, by damped least squares.
 
     With J as for ``approach``, speeds = (J'J + damping^2)^-1 J'(twist, weighted). A joint at its
     limit that would have to go beyond it stands still, and the others do what they can.

@@ -52,7 +52,7 @@ PERIODS = np.arange(20.0, 181.0, 2.0)
 RIPPLE = 0.01
 """The size of such torque beforehand, as a share of the peak torque."""
 MOST_PERIODS, EXPLAINED = 3, 0.1
-"""So many are fitted, each if it explains this share of what is left."""
+"""Greatest number of waves that are fitted, and the share of the residual that each must explain."""
 _DRAWS = 600
 _LINK = 10
 
@@ -192,7 +192,7 @@ def identify_motors(
 
 
 def _differences(n: int) -> Array:
-    """Directions in which torque constants differ and their mean stays, (n, n - 1)."""
+    """Return the directions in which torque constants differ and their mean stays, (n, n - 1)."""
     values, vectors = np.linalg.eigh(np.eye(n) - np.full((n, n), 1.0 / n))
     return np.asarray(vectors[:, values > 0.5])
 
@@ -205,8 +205,9 @@ def _motor_angles(
 
 
 def waves_of(turned: Array, periods: float, period: float) -> Array:
-    """Sines of the motors' angles, then cosines, filtered as all signals are, at the ticks of the
-    equations, (ticks, 2 n)."""
+    """Return the sines of the motors' angles, then cosines, filtered as all signals are, at the ticks of the equations,
+    (ticks, 2 n).
+    """
     edge = round(EDGE / period)
     waves = smooth(np.hstack([np.sin(periods * turned), np.cos(periods * turned)]), period)
     return waves[edge : len(turned) - edge : EVERY]

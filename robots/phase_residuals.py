@@ -37,7 +37,7 @@ def phase_residuals(
     robot: RobotDescription, motion: MeasuredRun, phase: NDArray[np.int64],
     names: Mapping[int, str], standing: frozenset[int], found: Calibration,
 ) -> dict[str, dict[str, float]]:  # fmt: skip
-    """Root mean squares of what the model does not explain, by phase, then by ``force`` [N] and ``moment``
+    """Return the root mean squares of what the model does not explain, by phase, then by ``force`` [N] and ``moment``
     [N m] of the base and by joint [N m].
 
     Args:

@@ -97,7 +97,7 @@ def _add_base(model: Any, base_joint: str) -> int:
 
 
 def _joint_model(joint: Joint) -> Any:
-    """Pinocchio's joint, its special one where the axis is a coordinate axis."""
+    """Return Pinocchio's joint, its special one where the axis is a coordinate axis."""
     import pinocchio as pin
 
     straight = {(1.0, 0.0, 0.0): "X", (0.0, 1.0, 0.0): "Y", (0.0, 0.0, 1.0): "Z"}.get(joint.axis)

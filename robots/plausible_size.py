@@ -20,8 +20,9 @@ have 0.7 (a humanoid with large inertias) to 54 kg/m^3, but a pendulum whose mas
 
 
 def ball_density(robot: RobotDescription) -> tuple[float, float]:
-    """Half the diagonal [m] of the box around the standing robot, and its mass over the volume of a ball of that radius
-    [kg/m^3]: infinite where all of it is in one point."""
+    """Return half the diagonal [m] of the box around the standing robot, and its mass over the volume of a ball of that
+    radius [kg/m^3]: infinite where all of it is in one point.
+    """
     poses = link_poses_in_base(robot, robot.standing_position)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for link in robot.links:
@@ -35,8 +36,9 @@ def ball_density(robot: RobotDescription) -> tuple[float, float]:
 
 
 def _extremes(robot: RobotDescription, name: str) -> list[tuple[Array, float]]:
-    """Places [m, link frame] and radii of what a link is known to fill: its joint, its shapes, and its mass, as a ball
-    of its radius of gyration."""
+    """Return the places [m, link frame] and radii of what a link is known to fill: its joint, its shapes, and its mass,
+    as a ball of its radius of gyration.
+    """
     link = robot.link(name)
     found = [(np.zeros(3), 0.0)]
     for shape in link.shapes:

@@ -23,11 +23,11 @@ from pydantic import (
 from ..mathematics.arrays import Array
 from ..mathematics.constants import GRAVITY
 from ..mathematics.linear_algebra import inverse, product
-from .part import Color, Length, Part, Radius, Vector3
+from .element import Color, Element, Length, Radius, Vector3
 from .shapes import Shape
 
 
-class Mesh(Part):
+class Mesh(Element):
     """A mesh that a link is drawn as, in place of its collision shapes.
 
     ``file`` is a path, or ``package://NAME/PATH`` of an installed package. The file's corners times
@@ -44,7 +44,7 @@ class Mesh(Part):
     color: Color | None = None
 
 
-class Box(Part):
+class Box(Element):
     """A box that a link is drawn as: its ``size`` [m] along x, y, z, its edges rounded by ``round`` [m].
 
     Its middle is at ``position`` [m, link frame], and ``orientation`` (a quaternion x, y, z, w) turns it;
@@ -58,7 +58,7 @@ class Box(Part):
     color: Color | None = None
 
 
-class TurnedPart(Part):
+class TurnedShape(Element):
     """A part as from a lathe that a link is drawn as: ``profile`` turned about ``axis``.
 
     A point of the profile is a radius and a place along the axis [m], counted from ``position``
@@ -71,7 +71,7 @@ class TurnedPart(Part):
     color: Color | None = None
 
 
-class Appearance(Part):
+class Appearance(Element):
     """Appearance of a link, in place of its collision shapes: ``meshes``, ``boxes`` and ``turned`` parts, and capsules
     for the rest of what an imported file shows.
     """
@@ -81,10 +81,10 @@ class Appearance(Part):
     meshes: tuple[Mesh, ...] = ()
     shapes: tuple[Shape, ...] = ()
     boxes: tuple[Box, ...] = ()
-    turned: tuple[TurnedPart, ...] = ()
+    turned: tuple[TurnedShape, ...] = ()
 
 
-class Link(Part):
+class Link(Element):
     """A rigid body: ``mass`` [kg], ``com`` [m, link frame], ``inertia`` about the CoM [kg m^2]
     as xx, yy, zz, xy, xz, yz, with products of inertia as they stand in the tensor."""
 
@@ -102,7 +102,7 @@ SLIDE_UNITS: Mapping[str, str] = {
 """Units of a sliding joint's quantities, or its motor's, by those of one that turns."""
 
 
-class Joint(Part):
+class Joint(Element):
     """A joint from ``parent`` to ``child`` at ``origin`` [m, parent frame].
 
     A ``hinge`` turns the child about ``axis`` [rad]; a ``slide`` moves it along ``axis`` [m].
@@ -124,7 +124,7 @@ class Joint(Part):
         return SLIDE_UNITS.get(hinge, hinge) if self.kind == "slide" else hinge
 
 
-class Foot(Part):
+class Foot(Element):
     """A foot: the ``link`` it belongs to and its ``sole`` centre [m, link frame]."""
 
     name: str
@@ -132,7 +132,7 @@ class Foot(Part):
     sole: Vector3
 
 
-class ContactPoint(Part):
+class ContactPoint(Element):
     """A point that may carry load, with rubber that is a ball of ``radius`` [m].
 
     ``position`` [m, link frame] is the ball's lowest point at the zero pose, so its centre is
@@ -145,7 +145,7 @@ class ContactPoint(Part):
     radius: float
 
 
-class Thruster(Part):
+class Thruster(Element):
     """A rotor with blades, a fan or a nozzle that pushes its ``link`` at ``position`` [m, link frame] along
     ``axis``, with up to ``max_thrust`` [N] and never backwards.
 
@@ -162,7 +162,7 @@ class Thruster(Part):
     time_constant: float = 0.0
 
 
-class MotorRating(Part):
+class MotorRating(Element):
     """The values of one motor, at the gearbox output, that differ from those of its profile.
 
     The meaning of each value is that of ``ActuatorProfile``; ``None`` is the profile's own value.
@@ -180,7 +180,7 @@ class MotorRating(Part):
     gear_play: float | None = None
 
 
-class ActuatorProfile(Part):
+class ActuatorProfile(Element):
     """The limits of the motors, at the gearbox output.
 
     ``peak_torque`` [N m] is available up to ``corner_speed`` and falls linearly to zero at
@@ -226,7 +226,7 @@ class Motors:
     gear_play: Array
 
 
-class PowerSupply(Part):
+class PowerSupply(Element):
     """Supply of the motors: a pack, or a supply on a bench.
 
     ``rated_voltage`` [V] is that at which the motors reach the speeds of their profile. A pack that is nearly full has
@@ -250,7 +250,7 @@ class PowerSupply(Part):
     winding_thermal_resistance: float | None = Field(None, gt=0.0)
 
     def heating(self, motors: Motors) -> Array:
-        """Copper heat of every motor for its torque squared [W/(N m)^2], (n_motors,)."""
+        """Return the copper heat of every motor for its torque squared [W/(N m)^2], (n_motors,)."""
         if self.torque_constant is not None and self.winding_resistance is not None:
             heat = self.winding_resistance / self.torque_constant**2
             return np.full(len(motors.peak_torque), heat)
@@ -259,7 +259,7 @@ class PowerSupply(Part):
         return slower / np.where(driven, motors.peak_torque, 1.0)
 
 
-class Transmission(Part):
+class Transmission(Element):
     """``joint_to_motor``: motor velocity = matrix times joint velocity (n_joints square), so
     joint torque = its transpose times motor torque."""
 
@@ -267,7 +267,7 @@ class Transmission(Part):
     joint_to_motor: tuple[tuple[float, ...], ...]
 
 
-class MountedSensorPart(Part):
+class SensorMount(Element):
     """A sensor mounted on a ``link`` at ``position`` [m, link frame], its axes turned from the link's by ``orientation``
     (a quaternion x, y, z, w).
 
@@ -284,22 +284,22 @@ class MountedSensorPart(Part):
     orientation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
 
 
-class Sensors(Part):
+class Sensors(Element):
     """The sensors that the robot has besides its joint encoders: an ``imu`` at the base's origin,
     parallel to the base, a tactile switch at every contact point, and further ones by name."""
 
     model_config = ConfigDict(extra="allow")
 
     if TYPE_CHECKING:  # Pydantic takes no value for this name before 2.9; type checkers need one
-        __pydantic_extra__: dict[str, MountedSensorPart] = Field(init=False)
+        __pydantic_extra__: dict[str, SensorMount] = Field(init=False)
     else:
-        __pydantic_extra__: dict[str, MountedSensorPart]
+        __pydantic_extra__: dict[str, SensorMount]
 
     imu: bool = True
     switches: bool = True
 
     @property
-    def mounted(self) -> Mapping[str, MountedSensorPart]:
+    def mounted(self) -> Mapping[str, SensorMount]:
         """The further sensors by name, in the order of the description."""
         return self.__pydantic_extra__ or {}
 
@@ -313,7 +313,7 @@ BASE_VELOCITIES = {"floating": 6, "planar": 3, "fixed": 0}
 """The number of velocities of each kind of base."""
 
 
-class RobotDescription(Part):
+class RobotDescription(Element):
     """A robot: links, joints, feet, contact points, transmission, actuators, sensors, stance.
 
     ``base_joint`` says how the base link is held: ``floating`` moves freely, ``planar`` moves in

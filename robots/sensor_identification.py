@@ -50,7 +50,7 @@ TYPICAL = 1.4826
 OUTLYING = 1.5
 """Ticks with errors beyond so many standard deviations count less, as when a foot rocks on the ground."""
 NOISE_CUTOFF = 20.0
-"""Above this velocities are noise alone [Hz]."""
+"""Frequency above which velocities are noise alone [Hz]."""
 SAMPLED = 0.02
 """The time between samples of the angles that are fitted [s]."""
 HIDDEN_TORQUE = 0.1
@@ -94,7 +94,7 @@ class IdentifiedSensors:
 
 
 def smooth(values: Array, period: float, cutoff: float = CUTOFF) -> Array:
-    """Columns after a Butterworth filter of the third order that goes forwards and backwards.
+    """Filter columns by a Butterworth filter of the third order that goes forwards and backwards.
 
     At both ends they go on as their reflection through the end, as in SciPy's ``sosfiltfilt``, whose package takes 2 s to
     import. Each section is a banded system of equations in its outputs.
@@ -114,7 +114,7 @@ def smooth(values: Array, period: float, cutoff: float = CUTOFF) -> Array:
 
 
 def _filtered(numerator: Array, denominator: Array, columns: Array) -> Array:
-    """Columns after a recursive filter that begins with zeros."""
+    """Filter columns by a recursive filter that begins with zeros."""
     from scipy.linalg.lapack import dtbtrs
 
     right = numerator[0] * columns
@@ -130,7 +130,7 @@ def slope(values: Array, period: float) -> Array:
 
 
 def shifted(values: Array, ticks: float) -> Array:
-    """Columns shifted by a number of ticks, interpolated linearly between ticks."""
+    """Shift columns by a number of ticks, interpolated linearly between ticks."""
     n = np.arange(len(values), dtype=np.float64)
     return np.array([np.interp(n + ticks, n, column) for column in values.T]).T
 
@@ -287,8 +287,8 @@ def base_motion(robot: RobotDescription, position: Array, *velocities: Array) ->
 
 
 def contact_jacobians(robot: RobotDescription, position: Array) -> tuple[Array, Array]:
-    """Jacobians of all contact points, (n, 3 n_contacts, n_velocities), and their places in the base's frame,
-    (n, n_contacts, 3), for the joints' angles (n, n_joints).
+    """Return the Jacobians of all contact points, (n, 3 n_contacts, n_velocities), and their places in the base's
+    frame, (n, n_contacts, 3), for the joints' angles (n, n_joints).
 
     A ball touches the ground below its centre and rolls. Where is below is told by three balls or more; with fewer
     the base is taken for level.
@@ -337,8 +337,9 @@ def _up(centres: Array) -> Array:
 def _gyroscope(
     base: Array, gyro: Array, yields: Array, period: float
 ) -> tuple[tuple[Estimate, ...], Estimate, float, Estimate]:
-    """Angle and age of the gyroscope beside the joints' velocities, what is left, and the compliance of
-    the gears; ``yields`` is how the base turns for a compliance of one."""
+    """Return the angle and age of the gyroscope beside the joints' velocities, what is left, and the compliance of the
+    gears; ``yields`` is how the base turns for a compliance of one.
+    """
     inner = _inner(len(base), period)
     angle, late, compliance = np.zeros(3), 0.0, 0.0
     left, covariance = 0.0, np.eye(11)
@@ -366,7 +367,7 @@ def _gyroscope(
 def _accelerometer(
     base: Array, gyro: Array, force: Array, angle: Array, gyro_late: float, period: float
 ) -> tuple[tuple[Estimate, ...], Estimate, float]:
-    """Place and age of the accelerometer beside the joints' velocities."""
+    """Return the place and age of the accelerometer beside the joints' velocities."""
     turning = shifted(gyro, gyro_late / period)
     turning = turning - np.cross(turning, angle)
     turning = turning - (turning - base[:, 3:6])[_inner(len(base), period)].mean(axis=0)
@@ -426,7 +427,7 @@ def _rotation_beyond(vectors: Array) -> Array:
 def fit(
     rows: Array, right: Array, prior: Array, period: float, correlated: float = CORRELATED
 ) -> tuple[Array, Array, float]:
-    """Least squares with a ``prior`` standard deviation of every unknown around zero.
+    """Solve least squares with a ``prior`` standard deviation of every unknown around zero.
 
     Residuals are ``correlated`` for that time [s] and have, row by row, a size of their own.
 

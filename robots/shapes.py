@@ -13,10 +13,10 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag
 
 from ..mathematics.arrays import Array, Indices
-from .part import Part, Vector3
+from .element import Element, Vector3
 
 
-class Capsule(Part):
+class Capsule(Element):
     """A collision capsule from ``start`` to ``end`` [m, link frame] of ``radius`` [m]."""
 
     start: Vector3
@@ -33,7 +33,7 @@ class Capsule(Part):
         return Capsule(start=place(self.start), end=place(self.end), radius=self.radius)
 
 
-class Hull(Part):
+class Hull(Element):
     """A convex collision body: the hull of its ``corners`` [m, link frame], four or more that lie in no plane."""
 
     corners: Annotated[tuple[Vector3, ...], Field(min_length=4)]
@@ -91,7 +91,7 @@ def corners_of(shapes: Sequence[Shape]) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=512)
 def convex(corners: tuple[Vector3, ...]) -> Any:
-    """Coal's hull of the corners, from which distances to others follow."""
+    """Return Coal's hull of the corners, from which distances to others follow."""
     import coal
 
     points = coal.StdVec_Vec3s()

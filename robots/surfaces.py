@@ -15,10 +15,10 @@ import numpy as np
 
 from ..mathematics.arrays import Array, Indices
 from ..mathematics.rotations import matrices_of_quaternions
+from .element import Vector3
 from .importing.meshes import mesh_triangles, simplified
 from .importing.package_files import find_file
-from .part import Vector3
-from .robot_description import Appearance, Box, Mesh, RobotDescription, TurnedPart
+from .robot_description import Appearance, Box, Mesh, RobotDescription, TurnedShape
 
 MOST_TRIANGLES = 24_000
 """Greatest number of triangles of a whole robot's meshes. Such a robot takes half a megabyte in a recording."""
@@ -161,7 +161,7 @@ def box_surface(box: Box) -> Surface:
     return Surface(_placed(box, points), pieces, _color(box.color))
 
 
-def turned_surface(part: TurnedPart) -> Surface:
+def turned_surface(part: TurnedShape) -> Surface:
     """Return the surface that the part's profile of radius and place along its axis sweeps, closed at both ends.
 
     Each piece of the profile has corners of its own, so that its ends are seen as edges.

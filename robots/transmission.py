@@ -1,4 +1,4 @@
-"""Between joints and motors: motion and torque both ways, and the gains that motors can give.
+"""Transmission between joints and motors: motion and torque both ways, and the gains that motors can give.
 
 With the transmission's matrix ``A`` (``RobotDescription.joint_to_motor``) and the joints' angles
 ``q``, torques ``tau`` and feedback gains ``K``::

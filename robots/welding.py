@@ -63,8 +63,9 @@ class WeldedRobot:
     loads: tuple[HeldLoad, ...] = ()
 
     def expand(self, values: Array, *, held: Sequence[float] | None = None) -> Array:
-        """Values of all joints (..., n) from those of the welded robot's (..., n_moving); the held
-        joints get ``held``, or zero."""
+        """Return the values of all joints (..., n) from those of the welded robot's (..., n_moving); the held joints
+        get ``held``, or zero.
+        """
         whole = np.zeros((*values.shape[:-1], len(self.moving) + len(self.held)))
         whole[..., list(self.moving)] = values
         if held is not None:
@@ -96,7 +97,7 @@ def _welded(text: str) -> WeldedRobot:
 
 
 @dataclass(frozen=True)
-class _Place:
+class _LinkPose:
     """Place of a link's frame in the link that it has become part of."""
 
     link: str
@@ -123,13 +124,13 @@ def _weld(robot: RobotDescription) -> WeldedRobot:
             f"{robot.name}: held joints {names} share motors with joints that move; "
             "hold all joints of these motors, or none"
         )
-    places = {robot.base: _Place(robot.base, np.eye(3), np.zeros(3))}
+    places = {robot.base: _LinkPose(robot.base, np.eye(3), np.zeros(3))}
     joints: dict[int, Joint] = {}
     for index, joint in from_base_outwards(robot):
         on = places[joint.parent]
         origin = on.point(joint.origin)
         if index in joints or index not in held:
-            places[joint.child] = _Place(joint.child, on.rotation, np.zeros(3))
+            places[joint.child] = _LinkPose(joint.child, on.rotation, np.zeros(3))
             changed = {
                 "parent": on.link,
                 "origin": _vector(origin),
@@ -142,7 +143,7 @@ def _weld(robot: RobotDescription) -> WeldedRobot:
             origin = origin + turn @ np.array(joint.axis) * value
         else:
             turn = turn @ axis_rotations(joint.axis, np.array([value]))[0]
-        places[joint.child] = _Place(on.link, turn, origin)
+        places[joint.child] = _LinkPose(on.link, turn, origin)
     kept = [robot.base, *(robot.joints[k].child for k in moving)]
     links = tuple(_merged(robot, places, link.name) for link in robot.links if link.name in kept)
     result = robot.model_copy(
@@ -182,7 +183,7 @@ def _weld(robot: RobotDescription) -> WeldedRobot:
     return WeldedRobot(robot_without, tuple(moving), tuple(held), angles, loads)
 
 
-def _load(robot: RobotDescription, places: dict[str, _Place], index: int) -> HeldLoad | None:
+def _load(robot: RobotDescription, places: dict[str, _LinkPose], index: int) -> HeldLoad | None:
     """Return the load on a held joint; ``None`` for a slide, and where something that stands on the ground hangs on
     it.
     """
@@ -211,12 +212,12 @@ def _load(robot: RobotDescription, places: dict[str, _Place], index: int) -> Hel
     )  # fmt: skip
 
 
-def _moved_contact(robot: RobotDescription, places: dict[str, _Place], contact: Any) -> Any:
+def _moved_contact(robot: RobotDescription, places: dict[str, _LinkPose], contact: Any) -> Any:
     link = next(foot.link for foot in robot.feet if foot.name == contact.foot)
     return contact.model_copy(update={"position": _vector(places[link].point(contact.position))})
 
 
-def _merged(robot: RobotDescription, places: dict[str, _Place], name: str) -> Link:
+def _merged(robot: RobotDescription, places: dict[str, _LinkPose], name: str) -> Link:
     """Return a link with all that is welded to it."""
     parts = [link for link in robot.links if places[link.name].link == name]
     mass, com, inertia = _lumped(places, parts)
@@ -230,8 +231,8 @@ def _merged(robot: RobotDescription, places: dict[str, _Place], name: str) -> Li
     return robot.link(name).model_copy(update=changed)
 
 
-def _lumped(places: dict[str, _Place], parts: Sequence[Link]) -> tuple[float, Array, Array]:
-    """Mass, centre of mass and inertia about it of links that are welded to each other."""
+def _lumped(places: dict[str, _LinkPose], parts: Sequence[Link]) -> tuple[float, Array, Array]:
+    """Return the mass, centre of mass and inertia about it of links that are welded to each other."""
     mass = float(sum(link.mass for link in parts))
     centres = [places[link.name].point(link.com) for link in parts]
     weighed = [link.mass * centre for link, centre in zip(parts, centres, strict=True)]

@@ -111,7 +111,7 @@ def type_store(distribution: str) -> Any:
 
 
 def full_type(name: str) -> str:
-    """``sensor_msgs/Imu`` and ``sensor_msgs/msg/Imu`` -> the latter."""
+    """Complete ``sensor_msgs/Imu`` to ``sensor_msgs/msg/Imu``."""
     parts = name.split("/")
     return f"{parts[0]}/msg/{parts[1]}" if len(parts) == 2 else name
 
@@ -261,7 +261,7 @@ class WrongMessageError(ValueError):
 
 
 def numpy_type(base: str) -> np.dtype[Any]:
-    """NumPy's type of one of ROS 2's numbers."""
+    """Return NumPy's type of one of ROS 2's numbers."""
     return np.dtype(_OTHER.get(base, base))
 
 

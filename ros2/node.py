@@ -40,7 +40,7 @@ def full_name(name: str, namespace: str = "/") -> str:
 
 
 def dds_type(name: str) -> str:
-    """``sensor_msgs/msg/Imu`` -> ``sensor_msgs::msg::dds_::Imu_``."""
+    """Convert ``sensor_msgs/msg/Imu`` to ``sensor_msgs::msg::dds_::Imu_``."""
     package, kind, message = name.split("/")
     return f"{package}::{kind}::dds_::{message}_"
 
@@ -228,7 +228,7 @@ _LOCK = threading.Lock()
 
 def join(address: NodeAddress) -> Node:
     """Return the node of this address, for one more block. Raises ``MissingExtraError``."""
-    need_extra("zenoh", "ros2", "a topic of ROS 2")
+    need_extra("rosbags", "ros2", "a topic of ROS 2")
     with _LOCK:
         node = _NODES.setdefault(address, Node(address))
         node.users += 1
@@ -243,7 +243,7 @@ def _leave_all() -> None:
 
 
 def leave(node: Node) -> None:
-    """One block needs the node no more; the last closes it."""
+    """Leave the node for one block; the last closes it."""
     with _LOCK:
         node.users -= 1
         last = node.users == 0

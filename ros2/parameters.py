@@ -77,7 +77,7 @@ class Ros2Block(Block):
 
     @classmethod
     def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
-        """Neither the domain nor the depth is a dimension."""
+        """Return the dimensions; neither the domain nor the depth is one."""
         return {}
 
     @classmethod

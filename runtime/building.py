@@ -123,7 +123,7 @@ class GraphBuilder:
         wires[port] = {key: _plain(value) for key, value in wire.items() if value}
 
     def yaml(self) -> str:
-        """The graph as the text of a file."""
+        """Return the graph as the text of a file."""
         lines = [f"{key}: {text_of(_plain(value))}" for key, value in self._keys.items()]
         lines.append("blocks:" if self._blocks else "blocks: {}")
         for name, block in self._blocks.items():
@@ -136,7 +136,7 @@ class GraphBuilder:
         Path(path).write_text(self.yaml(), encoding="utf-8")
 
     def load(self, overrides: Mapping[str, Any] | Sequence[str] = ()) -> Graph:
-        """The checked graph.
+        """Return the checked graph.
 
         Raises:
             LoadError: the graph may not run. Places in the report are those of ``yaml``.
@@ -148,7 +148,7 @@ class GraphBuilder:
 
 
 def _plain(value: Any) -> Any:
-    """Sources as texts, arrays as lists."""
+    """Convert sources to texts and arrays to lists."""
     if isinstance(value, Source):
         return value.text
     if hasattr(value, "tolist"):

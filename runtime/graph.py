@@ -17,7 +17,7 @@ from typing import Any
 
 from ..files.nodes import text_of
 from .language.errors import AloftError
-from .language.fault import FOLDER
+from .language.signal_error import FOLDER
 from .language.stages import CheckedGraph, ClockSpec
 from .links.path_ages import path_sinks
 from .loading import load as load_checked
@@ -68,14 +68,14 @@ class Graph:
         """Run the graph from start to close.
 
         Args:
-            duration: how long [s of the graph's time]; by default as the graph says.
-            seed: the value of every parameter called ``seed``; by default as the graph says.
-            clock: how to pace it; by default as the graph says.
+            duration: how long [s of the graph's time]; by default that of the graph.
+            seed: the value of every parameter called ``seed``; by default that of the graph.
+            clock: how to pace it; by default that of the graph.
             sinks: what else records the run.
             log: whether to keep every signal of every tick.
             plain: whether to run all kernels as plain Python: slower, with the same bytes.
             fuse: whether blocks of kernels that follow each other are one compiled call.
-            real_time: what the control thread asks of the operating system while it ticks.
+            real_time: what the control thread requests from the operating system while it ticks.
 
         Returns:
             The outcome; a run that failed is one too, see ``RunResult.raise_if_failed``.
@@ -102,10 +102,10 @@ class Graph:
         ).run(ticks)
 
     def open(self, *, seed: int | None = None, plain: bool = False) -> SteppedRun:
-        """A run that is stepped from Python, for a ``with`` statement; see ``SteppedRun``.
+        """Return a run that is stepped from Python, for a ``with`` statement; see ``SteppedRun``.
 
         Args:
-            seed: the value of every parameter called ``seed``; by default as the graph says.
+            seed: the value of every parameter called ``seed``; by default that of the graph.
             plain: whether to run all kernels as plain Python.
 
         Raises:
@@ -116,11 +116,11 @@ class Graph:
         )
 
     def with_seed(self, seed: int) -> Graph:
-        """The same graph with this value for every parameter called ``seed``."""
+        """Return the same graph with this value for every parameter called ``seed``."""
         return self.changed(dict.fromkeys(self.seed_parameters, seed))
 
     def changed(self, overrides: Mapping[str, Any] | Sequence[str]) -> Graph:
-        """The same graph with other parameters.
+        """Return the same graph with other parameters.
 
         Raises:
             LoadError: the changed graph may not run.
@@ -128,7 +128,7 @@ class Graph:
         return Graph(load_text(self.checked.text, self.checked.file, overrides))
 
     def _repr_html_(self) -> str:
-        """The block diagram, for notebooks."""
+        """Draw the block diagram, for notebooks."""
         from .drawing.diagram import diagram
         from .drawing.layout import draw
         from .drawing.render import svg
@@ -136,7 +136,7 @@ class Graph:
         return svg(draw(diagram(self.checked)), self.checked.name)
 
     def about(self) -> Mapping[str, Any]:
-        """What there is to say of a run beside its result: nothing."""
+        """Return the additional result fields of a run: none."""
         return {}
 
 
@@ -146,7 +146,7 @@ def load(
     *,
     path: str | PathLike[str] = "graph.yaml",
 ) -> Graph:
-    """A graph, checked, with ``overrides`` applied.
+    """Load and check a graph, with ``overrides`` applied.
 
     Args:
         graph: a YAML file, a shipped one such as ``aloft:jump``, the text of such a file (with more

@@ -41,13 +41,13 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = "aloft"
 MOST_TESTS = 6
-"""At most so many test files are run for one change, the nearest first."""
+"""Largest number of test files that are run for one change, the nearest first."""
 ROOM_TESTS = {
     "runtime/loading/": "tests/graphs/test_wrong_graphs.py",
     "robots/validation/": "tests/robots/validation/test_find_faults.py",
     "blocks/general/": "tests/blocks/general/test_units.py",
 }
-"""What tests a folder as a whole, without importing its files."""
+"""Tests of a folder as a whole, which do not import its files."""
 
 OPERATORS: dict[type[ast.AST], tuple[str, tuple[str, ...]]] = {
     ast.Add: ("+", ("-",)),
@@ -100,7 +100,7 @@ class Change:
     tests: list[str] = field(default_factory=list)
 
     def applied(self, text: str) -> str | None:
-        """The text of the file with the change, or None where the file has become another."""
+        """Return the text of the file with the change, or None where the file has become another."""
         lines = text.splitlines(keepends=True)
         if self.line > len(lines):
             return None
@@ -158,7 +158,7 @@ def main() -> None:
 
 
 def draw(folders: list[str], count: int, numbers: random.Random) -> list[Change]:
-    """Changes of random functions, from each folder in turn."""
+    """Draw changes of random functions, from each folder in turn."""
     rooms = [functions_with_changes(folder) for folder in folders]
     drawn: list[Change] = []
     while len(drawn) < count and any(rooms):
@@ -170,7 +170,7 @@ def draw(folders: list[str], count: int, numbers: random.Random) -> list[Change]
 
 
 def functions_with_changes(folder: str) -> list[list[Change]]:
-    """For each function of a folder, or of one file, the changes that can be made to it."""
+    """Return for each function of a folder, or of one file, the changes that can be made to it."""
     start = ROOT / folder
     paths = [start] if start.is_file() else sorted(start.rglob("*.py"))
     found = []
@@ -184,7 +184,7 @@ def functions_with_changes(folder: str) -> list[list[Change]]:
 
 
 def outer_functions(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    """Functions and methods, not those inside of others."""
+    """Yield functions and methods, not those inside of others."""
     pending: list[ast.AST] = list(tree.body)
     while pending:
         node = pending.pop(0)
@@ -208,7 +208,7 @@ def changes_of(
 
 
 def executed(function: ast.FunctionDef | ast.AsyncFunctionDef) -> Iterator[tuple[ast.AST, bool]]:
-    """The nodes of a function that compute something, and whether each is part of an index."""
+    """Yield the nodes of a function that compute something, and whether each is part of an index."""
     defaults: list[ast.AST] = [*function.args.defaults, *filter(None, function.args.kw_defaults)]
     pending = [(each, False) for each in (*defaults, *function.body)]
     while pending:
@@ -236,7 +236,7 @@ def executed(function: ast.FunctionDef | ast.AsyncFunctionDef) -> Iterator[tuple
 
 
 def is_text(node: ast.AST) -> bool:
-    """Whether an operand of ``+`` or ``*`` joins sequences and is no number."""
+    """Tell whether an operand of ``+`` or ``*`` joins sequences and is no number."""
     text = ast.JoinedStr | ast.List | ast.Tuple | ast.ListComp
     return isinstance(node, text) or (
         isinstance(node, ast.Constant) and isinstance(node.value, str | bytes)
@@ -246,7 +246,8 @@ def is_text(node: ast.AST) -> bool:
 def tokens_of(
     node: ast.AST, is_index: bool, lines: list[str]
 ) -> Iterator[tuple[int, int, str, tuple[str, ...]]]:
-    """What of a node can be changed: line, column, the token, and what can stand there instead."""
+    """Yield the tokens of a node that can be changed: line, column, the token, and its possible
+    replacements."""
     match node:
         case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
             yield from between(left, op, right, lines)
@@ -278,7 +279,7 @@ def tokens_of(
 def between(
     first: ast.expr, op: ast.AST, second: ast.expr, lines: list[str]
 ) -> Iterator[tuple[int, int, str, tuple[str, ...]]]:
-    """The operator that stands between two operands, maybe lines further down."""
+    """Yield the operator that stands between two operands, maybe lines further down."""
     token, afters = OPERATORS[type(op)]
     word = rf"(?<!\w){token}(?!\w)" if token[0].isalpha() else re.escape(token)
     line, column = first.end_lineno or first.lineno, first.end_col_offset or 0
@@ -359,7 +360,8 @@ class Copy:
         change.seconds = round(time.monotonic() - start, 1)
 
     def duration(self, test: str, mark: str) -> float | None:
-        """How long a test file takes without a change [s]; None where it fails or has no test."""
+        """Measure the duration of a test file without a change [s]; None where it fails or has no
+        test."""
         if (test, mark) not in self.durations:
             start = time.monotonic()
             code = self._run(test, mark, self.limit)
@@ -377,7 +379,7 @@ class Copy:
             yield tests[0], "long"
 
     def tests_of(self, file: str) -> list[str]:
-        """The test files of a file of the package, the one that mirrors it first."""
+        """Return the test files of a file of the package, the one that mirrors it first."""
         found = self._own_tests(file)
         reached, latest = {file}, {file}
         while not found and latest:
@@ -415,7 +417,7 @@ class Copy:
         os.utime(path, (moment, moment))
 
     def _run(self, test: str, mark: str, limit: float) -> int | None:
-        """The exit code of pytest, or None where it had to be stopped."""
+        """Run a test file and return the exit code of pytest, or None where it had to be stopped."""
         environment = os.environ | {
             "PYTHONPATH": str(self.folder),
             "XDG_CACHE_HOME": str(self.folder / "cache"),
@@ -443,7 +445,8 @@ class Copy:
 
 
 def importers_of(root: Path) -> dict[str, set[str]]:
-    """For each file of the package the others that import it; ``__init__.py`` stands for nothing."""
+    """Return for each file of the package the others that import it; ``__init__.py`` stands for
+    nothing."""
     files = [
         path.relative_to(root)
         for path in sorted(root.rglob("*.py"))

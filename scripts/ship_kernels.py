@@ -26,8 +26,8 @@ TRIPLES = ("x86_64-unknown-linux-gnu", "aarch64-unknown-linux-gnu")
 
 
 def kernels_of(graphs: Iterable[Path]) -> list[shipped.Kernel]:
-    """The kernels that graphs call, each once for each choice of types. Files that are no whole graphs,
-    and graphs whose devices are not there, are left out, and named."""
+    """Return the kernels that graphs call, each once for each choice of types. Files that are no
+    whole graphs, and graphs whose devices are not there, are left out, and named."""
     found: dict[tuple[str, str], shipped.Kernel] = {}
     for path in graphs:
         try:

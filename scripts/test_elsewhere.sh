@@ -46,7 +46,7 @@ import tomllib
 with open("pyproject.toml", "rb") as file:
     told = tomllib.load(file)
 extras = told["project"]["optional-dependencies"]
-for text in [*told["project"]["dependencies"], *extras["plan"], *extras["machines"]]:
+for text in [*told["project"]["dependencies"], *extras["plan"]]:
     name, oldest = re.match(r"([\w.-]+)>=([\d.]+)", text).groups()
     exact = f"{name}~={oldest}.0" if oldest.count(".") == 1 else f"{name}=={oldest}"
     print(exact if sys.argv[1] == "oldest" else text)

@@ -1,4 +1,4 @@
-"""Weighs the package: what a maintainer has to read, and where one thing is said more than once.
+"""Weighs the package: the code that a maintainer has to read, and the declarations that repeat others.
 
     python scripts/weigh.py                     the working tree, folder by folder and in total
     python scripts/weigh.py --base a4c74fc      beside a git revision
@@ -29,7 +29,7 @@ BESIDE = "benchmarks"
 SHORT = 60
 """A file with fewer lines is short."""
 WIDEST = 8
-"""How many of the functions with the most arguments are listed."""
+"""Number of the functions with the most arguments that are listed."""
 
 MEASURES = {
     "files": "Python files",
@@ -58,7 +58,7 @@ VAGUE = {
 
 @dataclass
 class Weight:
-    """What was counted in one folder, by measure, and in total the names and places behind it."""
+    """The counts of one folder by measure; in total also the names and places behind them."""
 
     counts: Counter[str] = field(default_factory=Counter)
     places: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
@@ -81,7 +81,7 @@ class Source:
         return self.path.split("/")[0] if "/" in self.path else "."
 
     def classes(self) -> list[ast.ClassDef]:
-        """Classes of the module itself, not those inside of others."""
+        """Return classes of the module itself, not those inside of others."""
         return [node for node in self.tree.body if isinstance(node, ast.ClassDef)]
 
 
@@ -101,7 +101,7 @@ def main() -> None:
 
 
 def working_tree() -> list[Source]:
-    """The tracked files as they are now, and new ones that git does not ignore."""
+    """Return the tracked files as they are now, and new ones that git does not ignore."""
     command = ["git", "ls-files", "--cached", "--others", "--exclude-standard", "*.py"]
     names = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
     return parse(
@@ -110,7 +110,7 @@ def working_tree() -> list[Source]:
 
 
 def revision(name: str) -> list[Source]:
-    """The files of a git revision."""
+    """Return the files of a git revision."""
     archive = subprocess.run(
         ["git", "archive", "--format=tar", name], cwd=ROOT, check=True, capture_output=True
     ).stdout
@@ -132,7 +132,8 @@ def parse(texts: dict[str, str]) -> list[Source]:
 
 
 def weigh(sources: list[Source]) -> dict[str, Weight]:
-    """The weight of each folder, of the whole package as ``total``, and of what lies beside it."""
+    """Count the weight of each folder, of the whole package as ``total``, and of everything beside
+    it."""
     weights = weigh_folders([each for each in sources if each.folder != BESIDE])
     if beside := [each for each in sources if each.folder == BESIDE]:
         weights[BESIDE] = weigh_folders(beside)["total"]
@@ -140,7 +141,7 @@ def weigh(sources: list[Source]) -> dict[str, Weight]:
 
 
 def weigh_folders(sources: list[Source]) -> dict[str, Weight]:
-    """The weight of each folder, and of all of them as ``total``."""
+    """Count the weight of each folder, and of all of them as ``total``."""
     weights: dict[str, Weight] = defaultdict(Weight)
     importers = imported_by(sources)
     declared = declared_fields(sources)
@@ -173,7 +174,7 @@ def weigh_folders(sources: list[Source]) -> dict[str, Weight]:
 
 
 def imported_by(sources: list[Source]) -> dict[str, set[str]]:
-    """For each file the other files of the package that import it."""
+    """Return for each file the other files of the package that import it."""
     modules = {module_of(source.path): source.path for source in sources}
     importers: dict[str, set[str]] = {source.path: set() for source in sources}
     for source in sources:
@@ -196,7 +197,7 @@ def module_of(path: str) -> tuple[str, ...]:
 
 
 def declared_fields(sources: list[Source]) -> list[set[str]]:
-    """The names of the fields of each Signal and each class of parameters in the package.
+    """Return the names of the fields of each Signal and each class of parameters in the package.
 
     A class counts as one of them when a base, over any number of classes of the package, is called
     Signal, Parameters or BaseModel.
@@ -227,7 +228,7 @@ def bases(node: ast.ClassDef) -> list[str]:
 
 
 def own_fields(node: ast.ClassDef) -> set[str]:
-    """The names that a class body declares: ``name: type`` and ``name = field(...)``."""
+    """Return the names that a class body declares: ``name: type`` and ``name = field(...)``."""
     found = set()
     for statement in node.body:
         if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
@@ -242,7 +243,8 @@ def is_named_tuple(node: ast.ClassDef) -> bool:
 
 
 def restates(node: ast.ClassDef, declared: list[set[str]]) -> bool:
-    """Whether a named tuple says so in its docstring, or has only fields that one declaration has."""
+    """Tell whether a named tuple says so in its docstring, or has only fields that one declaration
+    has."""
     if "The fields of" in (ast.get_docstring(node) or ""):
         return True
     names = own_fields(node)
@@ -250,7 +252,7 @@ def restates(node: ast.ClassDef, declared: list[set[str]]) -> bool:
 
 
 def kernels(tree: ast.Module) -> Iterator[ast.FunctionDef]:
-    """The functions that are decorated with ``@kernel``, with or without arguments."""
+    """Yield the functions that are decorated with ``@kernel``, with or without arguments."""
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef):
             names = [ast.unparse(each).split("(")[0] for each in node.decorator_list]
@@ -266,7 +268,8 @@ def calls_of_float(node: ast.AST) -> int:
 
 
 def count_shared_names(sources: list[Source], weights: dict[str, Weight]) -> None:
-    """Names of classes that are defined in more than one file; a folder counts those it defines."""
+    """Count names of classes that are defined in more than one file; a folder counts those it
+    defines."""
     for measure, counted in (("shared names", None), ("shared tuples", is_named_tuple)):
         places: dict[str, list[tuple[str, str]]] = defaultdict(list)
         for source in sources:
@@ -279,7 +282,7 @@ def count_shared_names(sources: list[Source], weights: dict[str, Weight]) -> Non
 
 
 def widths(source: Source) -> Iterator[tuple[str, int]]:
-    """The functions of a file with the number of their arguments, without self and cls."""
+    """Yield the functions of a file with the number of their arguments, without self and cls."""
     for node in ast.walk(source.tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             every = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
@@ -294,7 +297,8 @@ def widest(weights: dict[str, Weight]) -> list[tuple[int, str]]:
 
 
 def as_data(weights: dict[str, Weight]) -> dict[str, object]:
-    """The weights as plain data: numbers for each folder; for the total also what is behind them."""
+    """Return the weights as plain data: numbers for each folder; for the total also the names
+    behind them."""
     folders = {
         name: {measure: weight.counts[measure] for measure in MEASURES}
         for name, weight in sorted(weights.items())
@@ -309,7 +313,7 @@ def as_data(weights: dict[str, Weight]) -> dict[str, object]:
 
 
 def print_table(now: dict[str, Weight], base: dict[str, Weight] | None) -> None:
-    """A row for each folder; with a base a second one with the numbers of the revision."""
+    """Print a row for each folder; with a base a second one with the numbers of the revision."""
     folders = {*now, *(base or {})}
     names = [*sorted(folders - {"total", BESIDE}), "total", *folders.intersection({BESIDE})]
     print(" " * 14 + "".join(f"{measure:>15}" for measure in MEASURES))

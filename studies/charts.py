@@ -40,7 +40,7 @@ class Group:
     values: list[float] = field(default_factory=list)
 
     def point(self, x: float, of_rate: bool) -> Point | None:
-        """The rate or the metric with its interval; ``None`` if no run has the metric."""
+        """Return the rate or the metric with its interval; ``None`` if no run has the metric."""
         if of_rate:
             low, high = wilson_interval(self.successes, self.n)
             return Point(x, self.successes / self.n, low, high)
@@ -51,7 +51,7 @@ class Group:
 
 
 def group(runs: Sequence[Run], plot: Plot, axes: Sequence[str]) -> dict[tuple[str, ...], Group]:
-    """The runs that the plot shows, by their labels on ``axes``."""
+    """Group the runs that the plot shows by their labels on ``axes``."""
     groups: dict[tuple[str, ...], Group] = {}
     for run in runs:
         outcome = run.outcome
@@ -67,7 +67,7 @@ def group(runs: Sequence[Run], plot: Plot, axes: Sequence[str]) -> dict[tuple[st
 
 
 def draw_plot(study: Study, plot: Plot, runs: Sequence[Run], rows: Sequence[StudyRow]) -> str:
-    """The picture as SVG text.
+    """Draw the picture as SVG text.
 
     Raises:
         AloftError: no run has the metric that is to be shown, or the plot shows no run.
@@ -102,7 +102,7 @@ def write_plots(
 
 
 def _values(study: Study, name: str) -> dict[str, float]:
-    """The numbers of an axis by label."""
+    """Return the numbers of an axis by label."""
     axis = study.axis(name)
     assert axis is not None
     return {case.label: float(case.value) for case in axis.cases}
@@ -135,13 +135,13 @@ def _polar(study: Study, plot: Plot, runs: Sequence[Run], rows: Sequence[StudyRo
 
 
 def reach(rates: dict[float, float], level: float) -> float:
-    """The largest value up to which all rates are at least ``level``; 0 where none is."""
+    """Return the largest value up to which all rates are at least ``level``; 0 where none is."""
     good = list(itertools.takewhile(lambda v: rates[v] >= level - 1e-12, sorted(rates)))
     return good[-1] if good else 0.0
 
 
 def _radians(axis: Axis) -> float:
-    """The factor from an angle of the axis to radians; bare numbers are degrees."""
+    """Return the factor from an angle of the axis to radians; bare numbers are degrees."""
     unit = parse_unit(axis.unit or "deg")
     rad = parse_unit("rad")
     return unit.factor_to(rad) if unit.same_dimension(rad) else math.radians(1.0)
@@ -216,7 +216,7 @@ class Dot:
 
 
 def dot_chart(title: str, x_label: str, dots: Sequence[Dot], *, share: bool = False) -> str:
-    """The chart as SVG text, the first dot at the top.
+    """Draw the chart as SVG text, the first dot at the top.
 
     With ``share`` the values are shares, and the axis goes from 0 to 100 %.
     """
@@ -265,8 +265,8 @@ def dot_chart(title: str, x_label: str, dots: Sequence[Dot], *, share: bool = Fa
 
 MOST_COLUMNS = 4
 MOST_BANDS = 3
-"""Where there are more lines than this, intervals are whiskers side by side: bands would hide each
-other."""
+"""Largest number of lines with bands; for more, intervals are whiskers side by side, because bands
+would hide each other."""
 
 
 @dataclass(frozen=True)
@@ -286,7 +286,7 @@ Panels = Mapping[str, Mapping[str, Sequence[Point]]]
 def line_panels(
     title: str, x_label: str, y_label: str, panels: Panels, *, share: bool = False
 ) -> str:
-    """The chart as SVG text. With ``share`` y is a share, and its axis goes from 0 to 100 %."""
+    """Draw the chart as SVG text. With ``share`` y is a share, and its axis goes from 0 to 100 %."""
     from matplotlib.ticker import PercentFormatter
 
     names = list(dict.fromkeys(name for lines in panels.values() for name in lines))
@@ -324,7 +324,7 @@ def line_panels(
 
 
 def _draw_line(axes: Axes, number: int, points: Sequence[Point], lines: int, panel: str) -> None:
-    """One line with its dots and its intervals."""
+    """Draw one line with its dots and its intervals."""
     from matplotlib.transforms import ScaledTranslation
 
     ordered = sorted(points, key=lambda point: point.x)
@@ -349,7 +349,7 @@ def _draw_line(axes: Axes, number: int, points: Sequence[Point], lines: int, pan
 
 
 def _label(axes: Axes, lines: Mapping[str, Sequence[Point]], names: Sequence[str]) -> None:
-    """The lines' names at their right ends."""
+    """Write the lines' names at their right ends."""
     figure = axes.get_figure(root=True)
     assert figure is not None
     figure.draw_without_rendering()
@@ -363,8 +363,8 @@ def _label(axes: Axes, lines: Mapping[str, Sequence[Point]], names: Sequence[str
 
 
 MOST_FILLED = 3
-"""Where there are more curves than this, none is filled, and the curves are turned a little against one
-another: they would hide what lies below."""
+"""Largest number of filled curves; more are not filled but turned a little against one another,
+because they would hide each other."""
 TURN = math.radians(1.0)
 """The angle between neighbours among many curves [rad]."""
 
@@ -376,7 +376,7 @@ def polar_chart(
     rings: Sequence[float],
     unit: str,
 ) -> str:
-    """The chart as SVG text.
+    """Draw the chart as SVG text.
 
     Args:
         title: stands on top.
@@ -424,7 +424,7 @@ def polar_chart(
 
 
 def goes_around(angles: Sequence[float]) -> bool:
-    """Whether no two neighbours of the sorted angles [rad] are more than a quarter turn apart."""
+    """Tell whether no two neighbours of the sorted angles [rad] are more than a quarter turn apart."""
     if len(angles) < 3:
         return False
     around = [*angles, angles[0] + 2 * math.pi]

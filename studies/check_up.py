@@ -1,4 +1,4 @@
-"""What looks wrong with a robot's description: ``aloft robot check-up``, and what keeps a robot from jumping.
+"""Oddities of a robot's description: ``aloft robot check-up``, and obstacles to jumping.
 
 Nothing here is a fault that a description is refused for. Each rule compares numbers that nobody writes down on
 purpose with what bodies, legs and motors of that size are like.
@@ -29,21 +29,21 @@ SLENDER, WIDE = 0.1, 1.5
 AWAY = 1.5
 """A centre of mass farther from the middle of the link's shapes than this times their reach is outside."""
 FAR = 4.0
-"""A joint farther from the middle of its parent's shapes than this times what both links reach is elsewhere; of the robots of
+"""A joint farther from the middle of its parent's shapes than this times the reach of both links is misplaced; of the robots of
 ``example-robot-data`` it is at most 1.7 times."""
 NEARLY_ALONG = math.radians(5.0)
 """An axis closer to a coordinate axis than this, and not along it, was measured or typed."""
 NEAR_LIMIT = 0.05
-"""rad; the standing robot is closer to a limit than this."""
+"""Distance from a limit below which the standing robot is close to it [rad]."""
 SLOW = 2.0
-"""Hz; legs whose motors turn their joints more slowly than this cannot balance a robot."""
+"""Least bandwidth of the joints of legs that can balance a robot [Hz]."""
 STEP = 0.1
-"""rad; the step that a joint's bandwidth is told by."""
+"""Step by which a joint's bandwidth is measured [rad]."""
 
 
 @dataclass(frozen=True)
 class Remark:
-    """Something that looks wrong: the ``part``, what was ``found``, and what is ``usual``."""
+    """An oddity of a description: the ``part``, the value ``found``, and the ``usual`` one."""
 
     part: str
     found: str
@@ -51,7 +51,7 @@ class Remark:
 
 
 def check_up(robot: RobotDescription) -> dict[str, Any]:
-    """The figures of a robot and the remarks about it, as plain data in SI units."""
+    """Compute the figures of a robot and the remarks about it, as plain data in SI units."""
     standing = standing_rows(robot)
     remarks = [
         *_size(robot), *_links(robot), *_joints(robot), *_axes(robot), *_limits(robot), *_stance(robot), *_sides(robot),
@@ -66,13 +66,13 @@ def check_up(robot: RobotDescription) -> dict[str, Any]:
 
 
 def _size(robot: RobotDescription) -> Iterator[Remark]:
-    """Mass and size of the whole robot."""
+    """Check mass and size of the whole robot."""
     for found in wrong_size(robot):
         yield Remark("the robot", found, "lengths in m and masses in kg")
 
 
 def _joints(robot: RobotDescription) -> Iterator[Remark]:
-    """Joints far from the links that they join."""
+    """Find joints far from the links that they join."""
     for joint in robot.joints:
         parent, child = robot.link(joint.parent), robot.link(joint.child)
         if not parent.shapes or not child.shapes:
@@ -86,7 +86,7 @@ def _joints(robot: RobotDescription) -> Iterator[Remark]:
 
 
 def _links(robot: RobotDescription) -> Iterator[Remark]:
-    """Masses and inertias."""
+    """Check masses and inertias."""
     for link in robot.links:
         share = link.mass / robot.total_mass
         if link.name != robot.base and share > HEAVY:
@@ -107,14 +107,14 @@ def _links(robot: RobotDescription) -> Iterator[Remark]:
 
 
 def _extent(link: Link) -> tuple[float, Array]:
-    """How far a link's shapes reach from their middle [m], and that middle (3,)."""
+    """Return the reach of a link's shapes from their middle [m], and that middle (3,)."""
     corners, radii = corners_of(link.shapes)
     low, high = (corners - radii[:, None]).min(axis=0), (corners + radii[:, None]).max(axis=0)
     return 0.5 * float(np.linalg.norm(high - low)), 0.5 * (low + high)
 
 
 def _axes(robot: RobotDescription) -> Iterator[Remark]:
-    """Axes that are nearly, and not quite, along a coordinate axis."""
+    """Find axes that are nearly, and not quite, along a coordinate axis."""
     for joint in robot.joints:
         along = max(abs(component) for component in joint.axis)
         off = math.acos(min(1.0, along))
@@ -124,7 +124,7 @@ def _axes(robot: RobotDescription) -> Iterator[Remark]:
 
 
 def _limits(robot: RobotDescription) -> Iterator[Remark]:
-    """Limits, and how the standing robot keeps off them."""
+    """Check limits, and the standing robot's distance from them."""
     for k, joint in enumerate(robot.joints):
         if joint.limits is None:
             yield Remark(
@@ -143,14 +143,14 @@ def _limits(robot: RobotDescription) -> Iterator[Remark]:
 
 
 def _stance(robot: RobotDescription) -> Iterator[Remark]:
-    """Feet that the robot cannot stand on."""
+    """Find feet that the robot cannot stand on."""
     off = off_its_feet(robot) if robot.contacts else ""
     if off:
         yield Remark("the standing pose", off, "a pose that rests on all contact points")
 
 
 def _sides(robot: RobotDescription) -> Iterator[Remark]:
-    """Legs of which left and right differ, and signs of joints that do."""
+    """Find legs of which left and right differ, and signs of joints that do."""
     from ..planner.models.symmetry import mirrored_pairs
     from ..robots.welding import welded
 
@@ -180,7 +180,7 @@ def _sides(robot: RobotDescription) -> Iterator[Remark]:
 
 
 def _motors(robot: RobotDescription, rows: list[dict[str, Any]]) -> Iterator[Remark]:
-    """Motors that cannot hold the robot, or hardly, and those that are slow; and rotors."""
+    """Find motors that cannot hold the robot, or hardly, and those that are slow; and rotors."""
     for row in rows:
         share = row["standing_share"]
         if share is not None and share > 0.5:
@@ -203,8 +203,9 @@ def _motors(robot: RobotDescription, rows: list[dict[str, Any]]) -> Iterator[Rem
 
 
 def standing_rows(robot: RobotDescription) -> list[dict[str, Any]]:
-    """Of every motor its peak torque, what standing takes of it (none where the robot cannot stand), and the bandwidth:
-    how often a second it could turn its joint by ``STEP`` and back, everything behind it at rest."""
+    """Return for every motor its peak torque, the part that standing takes (none where the robot
+    cannot stand), and the bandwidth: the rate at which it could turn its joint by ``STEP`` and
+    back, everything behind it at rest."""
     from ..hal.simulated.mujoco_model import build_mujoco_model
     from ..hal.simulated.stance import joint_inertias, standing_torques
 
@@ -228,7 +229,7 @@ def standing_rows(robot: RobotDescription) -> list[dict[str, Any]]:
 
 
 def obstacles_to_jumping(robot: RobotDescription) -> list[str]:
-    """What keeps a robot from jumping whatever the jump, in its own terms; empty where nothing does."""
+    """List the obstacles to any jump of a robot, in its own terms; empty where there are none."""
     if robot.base_joint != "floating":
         return [
             f"its base is {robot.base_joint}: write base_joint: floating, if it can leave the ground"
@@ -248,7 +249,8 @@ def obstacles_to_jumping(robot: RobotDescription) -> list[str]:
 
 
 def off_its_feet(robot: RobotDescription) -> str:
-    """Why a robot with feet cannot stand on them in its standing pose; empty where it can."""
+    """Return the reason why a robot with feet cannot stand on them in its standing pose; empty
+    where it can."""
     from ..hal.simulated.unsupported import uneven_contacts
     from ..mathematics.capture_step import support_margin
     from ..robots.kinematics import standing_contacts, standing_feet
@@ -268,8 +270,8 @@ def off_its_feet(robot: RobotDescription) -> str:
 
 
 def torque_factor(task: Any, robot: RobotDescription) -> float | None:
-    """How many times as strong and fast the motors must be for a task to have a plan; none where they are
-    not what is in the way."""
+    """Return the factor on the motors' strength and speed with which a task has a plan; none where
+    they are not in the way."""
     from ..planner.library.library import solve_and_check
     from ..planner.task.files import JumpTaskError, PlanError
 
@@ -287,7 +289,7 @@ SCALED = ("peak_torque", "continuous_torque", "corner_speed", "no_load_speed")
 
 
 def with_stronger_motors(robot: RobotDescription, factor: float) -> RobotDescription:
-    """The robot with torque and speed of its motors scaled, in every profile."""
+    """Return the robot with torque and speed of its motors scaled, in every profile."""
     profiles = {}
     for name, profile in robot.profiles.items():
         motors = {

@@ -35,7 +35,7 @@ from .study import Study
 from .summary import Z_95, wilson_interval
 
 SUCCESS = "success"
-"""What a comparison of success rates is called, beside those of metrics."""
+"""Name of a comparison of success rates, beside those of metrics."""
 POWER = 0.8
 """The probability with which a difference should show in as many seeds as are said to be needed."""
 Z_POWER = 0.8416212335729143
@@ -44,7 +44,8 @@ Z_POWER = 0.8416212335729143
 
 @dataclass(frozen=True)
 class Comparing:
-    """What is compared: the axis (empty for nothing), its base, and the differences that should show, by metric."""
+    """A request to compare: the axis (empty for nothing), its base, and the differences that should
+    show, by metric."""
 
     axis: str
     base: str
@@ -91,12 +92,13 @@ class Comparison:
     seeds_needed: int | None
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data."""
+        """Return the comparison as plain data."""
         return dict(vars(self))
 
 
 def read_detect(texts: Sequence[str]) -> dict[str, float]:
-    """The differences that should show: ``0.05`` or ``5%`` for success, ``peak_tilt_deg=2`` for a metric.
+    """Read the differences that should show: ``0.05`` or ``5%`` for success, ``peak_tilt_deg=2``
+    for a metric.
 
     Raises:
         AloftError: a text is of another form, or its number is no difference.
@@ -121,7 +123,7 @@ def read_detect(texts: Sequence[str]) -> dict[str, float]:
 
 
 def compared_axis(study: Study, text: str) -> tuple[str, str]:
-    """The axis that ``--compare`` means, and the label of its base.
+    """Read the axis that ``--compare`` means, and the label of its base.
 
     Args:
         study: the study.
@@ -158,7 +160,8 @@ def compared_axis(study: Study, text: str) -> tuple[str, str]:
 
 
 def compare(study: Study, runs: Sequence[Run], asked: Comparing) -> list[Comparison]:
-    """Every other label of the axis against the base: success first, then every metric by name.
+    """Compare every other label of the axis with the base: success first, then every metric by
+    name.
 
     Labels without a pair are left out.
 
@@ -200,7 +203,7 @@ def compare(study: Study, runs: Sequence[Run], asked: Comparing) -> list[Compari
 
 
 def _shared(run: Run, axis: str) -> tuple[Any, ...]:
-    """What the runs of a pair have in common."""
+    """Return the key that the runs of a pair share: the seed, and the labels on other axes."""
     return (run.seed, *(label for name, label in run.cell.labels.items() if name != axis))
 
 
@@ -286,12 +289,13 @@ def _over_seeds(by_seed: Mapping[int, Sequence[float]], asked: float | None) -> 
 
 
 def _seeds(needed: float) -> int | None:
-    """So many whole seeds, at least two."""
+    """Round up to whole seeds, at least two."""
     return max(2, math.ceil(needed - 1e-9)) if math.isfinite(needed) else None
 
 
 def sign_flip_p(differences: Sequence[int]) -> float:
-    """How likely whole differences whose signs are chance have a sum as far from zero as these.
+    """Return the probability that whole differences with random signs have a sum as far from zero
+    as these.
 
     The exact distribution of the sum, term by term.
     """
@@ -308,7 +312,8 @@ def sign_flip_p(differences: Sequence[int]) -> float:
 def paired_interval(
     both: int, only_first: int, only_second: int, neither: int
 ) -> tuple[float, float]:
-    """The 95 % interval of a difference of paired success rates, first minus second (Newcombe's method 10).
+    """Compute the 95 % interval of a difference of paired success rates, first minus second
+    (Newcombe's method 10).
 
     Wilson's intervals of the two rates are joined with their correlation phi, whose numerator is
     reduced by half the number of pairs where it is positive:
@@ -335,7 +340,8 @@ def paired_interval(
 
 
 def pairs_for_success(difference: float, unequal: float) -> float:
-    """The pairs in which a difference of success rates shows with the probability ``POWER``.
+    """Compute the number of pairs in which a difference of success rates shows with the probability
+    ``POWER``.
 
     Args:
         difference: of the rates, above zero.

@@ -48,7 +48,7 @@ def run_job(work: Job) -> Outcome:
 
 
 def outcome_of(result: RunResult, wall_time: float = 0.0) -> Outcome:
-    """The part of a run's result that is kept.
+    """Return the part of a run's result that is kept.
 
     Raises:
         AloftError: a signal ended the run, so it has no outcome.
@@ -67,7 +67,7 @@ def outcome_of(result: RunResult, wall_time: float = 0.0) -> Outcome:
 
 
 def run_pool(workers: int = 0, cluster: str = "") -> JobPool:
-    """The processes, or the cluster, that make runs."""
+    """Start the processes, or the cluster, that make runs."""
     return JobPool(run_job, workers=workers, cluster=cluster)
 
 
@@ -78,7 +78,8 @@ def make_runs(
     *,
     on_run: Callable[[Outcome], None] = lambda outcome: None,
 ) -> list[Run]:
-    """All runs with their outcomes, in the order of ``runs``; ``pool`` is one of ``run_pool``.
+    """Make all runs and return them with their outcomes, in the order of ``runs``; ``pool`` is one
+    of ``run_pool``.
 
     Runs that are in the journal are not made again. Every other run is kept as soon as it is done.
     Runs with the same key are made once, and ``on_run`` is called once for them. The death of a

@@ -23,7 +23,7 @@ from ..runtime.loading import load, load_text
 from .study import Arm, Axis, Coordinate, Study, StudyTask
 
 Tuned = Mapping[str, Mapping[str, Any]]
-"""What tuning found: parameters by arm."""
+"""Tuned parameters by arm."""
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,9 @@ class Cell:
     task: str
     arm: str
     labels: Mapping[str, str]
-    """By axis, ``task`` and ``arm`` among them."""
+    """Labels by axis, ``task`` and ``arm`` among them."""
     coordinates: Mapping[str, Coordinate]
-    """By the column of each axis of the grid."""
+    """Coordinates by the column of each axis of the grid."""
     graph: Path
     include: tuple[Path, ...]
     sets: Mapping[str, Entry]
@@ -44,9 +44,9 @@ class Cell:
     behind: tuple[Path, ...] = ()
     """The files that follow the graph."""
     base: Mapping[str, Entry] | None = None
-    """Of a draw: the overrides before it was made, which all draws share."""
+    """Overrides before a draw was made, which all draws share."""
     key: str = ""
-    """What the outcome depends on, but for the seed; set once the cell is checked."""
+    """Hash of everything that decides the outcome but the seed; set once the cell is checked."""
 
     @property
     def overrides(self) -> dict[str, Any]:
@@ -54,14 +54,14 @@ class Cell:
         return {key: plain(entry.value) for key, entry in self.sets.items()}
 
     def with_sets(self, values: Mapping[str, Any], where: Position) -> Cell:
-        """The cell with further overrides, which are at one place."""
+        """Return the cell with further overrides, which are at one place."""
         more = {key: Entry(key, where, from_plain(value, where)) for key, value in values.items()}
         return replace(self, sets={**self.sets, **more})
 
 
 @dataclass(frozen=True)
 class Job:
-    """What another process needs to make one run of a cell."""
+    """The data that another process needs to make one run of a cell."""
 
     graph: str
     include: tuple[str, ...]
@@ -74,7 +74,7 @@ class Job:
 
 
 def cells(study: Study, tuned: Tuned | None = None, common: Sequence[Entry] = ()) -> Iterator[Cell]:
-    """Every cell, by task, then by arm, then by the axes with the last one fastest.
+    """Yield every cell, by task, then by arm, then by the axes with the last one fastest.
 
     ``common`` is applied after the study's ``set`` and before all other overrides.
     """
@@ -109,7 +109,7 @@ def checked_cells(
     fingerprint: str,
     on_cell: Callable[[], None] = lambda: None,
 ) -> list[Cell]:
-    """The cells with their keys.
+    """Return the cells with their keys.
 
     Raises:
         LoadError: some graph may not run with its overrides; the report has all problems of all cells, with the
@@ -150,7 +150,7 @@ def load_cell(
     origin: Path,
     behind: Sequence[Path] = (),
 ) -> Graph:
-    """The graph between files that it includes, with a cell's overrides. Raises ``LoadError``."""
+    """Load the graph between files that it includes, with a cell's overrides. Raises ``LoadError``."""
     if not include and not behind:
         return Graph(load(graph, overrides))
     files = [os.path.relpath(file, origin.parent) for file in (*include, graph, *behind)]
@@ -158,7 +158,8 @@ def load_cell(
 
 
 def seeded_graph(work: Job) -> Graph:
-    """The graph of one run: that of its cell, with the seed in all of its parameters for seeds.
+    """Load the graph of one run: that of its cell, with the seed in all of its parameters for
+    seeds.
 
     Raises:
         LoadError: the graph cannot be loaded.
@@ -172,7 +173,7 @@ def seeded_graph(work: Job) -> Graph:
 
 
 def job(cell: Cell, seed: int) -> Job:
-    """A run of the cell, for another process."""
+    """Return a run of the cell, for another process."""
     base = cell.sets if cell.base is None else cell.base
     drawn = {k: plain(each.value) for k, each in cell.sets.items() if base.get(k) is not each}
     return Job(
@@ -187,7 +188,7 @@ def job(cell: Cell, seed: int) -> Job:
 
 
 def _key(graph: CheckedGraph, fingerprint: str, known: dict[str, str]) -> str:
-    """A hash of the flattened graph and of every file that a parameter names."""
+    """Hash the flattened graph and every file that a parameter names."""
     digest = hashlib.sha256(f"{fingerprint}\n{graph.text}".encode())
     for spec in graph.blocks:
         module = getattr(spec.block_type, "__module__", "")
@@ -200,7 +201,7 @@ def _key(graph: CheckedGraph, fingerprint: str, known: dict[str, str]) -> str:
 
 
 def _source(block_type: type) -> Path:
-    """The file that somebody else's block is written in."""
+    """Return the file that somebody else's block is written in."""
     import sys
 
     module = sys.modules.get(block_type.__module__)
@@ -208,7 +209,7 @@ def _source(block_type: type) -> Path:
 
 
 def _content(path: Path, known: dict[str, str]) -> str:
-    """The hash of a file's content; empty where there is no such file."""
+    """Return the hash of a file's content; empty where there is no such file."""
     shown = str(path)
     if shown not in known:
         is_file = bool(path.name) and path.is_file()

@@ -51,9 +51,10 @@ AT_ONCE = 16
 SPACED = 4
 """Values between the failing one and the graph's that are tried at once."""
 NARROWED = 3
-"""How often; the failure is then known to (1 + ``SPACED``)^-``NARROWED`` of the way."""
+"""Number of narrowing steps; the failure is then known to (1 + ``SPACED``)^-``NARROWED`` of the
+way."""
 MOST_PASSES = 3
-"""How often all parameters are made simpler in turn."""
+"""Number of times that all parameters are made simpler in turn."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class Attempt:
 
     @property
     def failed(self) -> bool:
-        """Whether the worst run does not succeed."""
+        """True if the worst run does not succeed."""
         return self.worst.outcome is not None and not self.worst.outcome.success
 
 
@@ -85,7 +86,7 @@ class Search:
 
     @property
     def failures(self) -> int:
-        """How many attempts failed."""
+        """Number of attempts that failed."""
         return sum(each.failed for each in self.attempts)
 
     @property
@@ -99,14 +100,14 @@ class Search:
 
 
 def searched_cells(study: Study) -> list[Cell]:
-    """The cells that every draw is tried on."""
+    """Return the cells that every draw is tried on."""
     falsification = _section(study)
     expanded = cells(study, read_tuned(study), falsification.sets)
     return [cell for cell in expanded if falsification.cells.takes(cell.labels)]
 
 
 def end_cells(study: Study, chosen: Sequence[Cell]) -> list[Cell]:
-    """Cells with each range at its ends. They are checked before anything runs."""
+    """Return cells with each range at its ends. They are checked before anything runs."""
     return cells_at_ends(chosen[0], _section(study).ranges) if chosen else []
 
 
@@ -117,7 +118,7 @@ def _section(study: Study) -> Falsification:
 
 
 def margin_of(outcome: Outcome, terms: Sequence[MarginTerm]) -> float:
-    """How far the run is from failing: in (0, 1] if it succeeds, in [-1, 0] if it does not.
+    """Compute the run's margin to failure: in (0, 1] if it succeeds, in [-1, 0] if it does not.
 
     A failed run without any of the metrics has the margin 0; so has one that fails by a criterion
     of which the margin knows nothing.
@@ -134,7 +135,7 @@ def margin_of(outcome: Outcome, terms: Sequence[MarginTerm]) -> float:
 
 
 def share_of(found: Range, value: Any) -> float:
-    """Where a value lies in the range of a number: 0 at the low end, 1 at the high one."""
+    """Return the position of a value in the range of a number: 0 at the low end, 1 at the high one."""
     number = in_unit(value, found.unit)
     assert number is not None
     low, high = found.bounds[0]
@@ -146,7 +147,7 @@ def share_of(found: Range, value: Any) -> float:
 def judged(
     number: int, values: Mapping[str, Any], runs: Sequence[Run], section: Falsification
 ) -> Attempt:
-    """The attempt with these parameters, from its runs.
+    """Judge the attempt with these parameters by its runs.
 
     Raises:
         AloftError: a run could not even begin.
@@ -231,7 +232,7 @@ def _check_metrics(run: Run, section: Falsification) -> None:
 
 
 def simplify(study: Study, found: Attempt, base: Cell, make: Make) -> Attempt:
-    """The simplest attempt that still fails, with the seed and in the cell of the worst run.
+    """Find the simplest attempt that still fails, with the seed and in the cell of the worst run.
 
     Args:
         study: the study.
@@ -293,7 +294,8 @@ def simplify(study: Study, found: Attempt, base: Cell, make: Make) -> Attempt:
 
 
 def _target(graph: CheckedGraph, each: Range, section: Falsification) -> float | None:
-    """Where a parameter is to go, in the unit of its range; ``None`` if it is no single number."""
+    """Return the value that simplification moves a parameter to, in the unit of its range; ``None``
+    if it is no single number."""
     if each.choices or not each.scalar:
         return None
     if each.key == section.smallest:
@@ -302,7 +304,8 @@ def _target(graph: CheckedGraph, each: Range, section: Falsification) -> float |
 
 
 def nominal_number(graph: CheckedGraph, each: Range) -> float | None:
-    """The number that the graph gives a parameter, in the unit of its range; ``None`` if it gives none."""
+    """Return the number that the graph gives a parameter, in the unit of its range; ``None`` if it
+    gives none."""
     path, *names = each.key.split(".")
     value: Any = next((spec.params for spec in graph.blocks if spec.path == path), None)
     unit = ""
@@ -324,7 +327,7 @@ def nominal_number(graph: CheckedGraph, each: Range) -> float | None:
 
 
 def _rounded(value: Any, each: Range, digits: int) -> Any:
-    """The value with so many digits; ``None`` if that is outside of the range."""
+    """Round the value to so many digits; ``None`` if that is outside of the range."""
     number = in_unit(value, each.unit)
     assert number is not None
     short = float(f"{number:.{digits}g}")
@@ -333,7 +336,7 @@ def _rounded(value: Any, each: Range, digits: int) -> Any:
 
 
 def graph_text(study: Study, found: Attempt, folder: Path) -> str:
-    """The failing run as a graph of a few lines.
+    """Write the failing run as a graph of a few lines.
 
     Args:
         study: the study.

@@ -111,8 +111,8 @@ LIBRARIES = ("numpy", "mujoco-core", "mujoco", "pin", "daqp", "qpsolvers")
 
 @cache
 def code_fingerprint() -> str:
-    """A hash of all code that may run in a graph, of the shipped plans, and of the versions of
-    what computes. Results that were made by other code are therefore not used."""
+    """Hash all code that may run in a graph, the shipped plans, and the versions of the packages
+    that compute. Results that were made by other code are therefore not used."""
     digest = hashlib.sha256()
     files = [p for folder in FOLDERS for p in (ROOT / folder).rglob("*") if p.suffix in SUFFIXES]
     for path in sorted([*files, *(ROOT / "graphs" / "plans").glob("*.npz")]):

@@ -32,31 +32,32 @@ from .landing_rehearsal import AFTER, LEARNT, angles_of, response
 from .rehearsal import LEVER
 
 BEFORE = 0.1
-"""s before lift-off in which the feet stand where they stood at the start."""
+"""Time before lift-off in which the feet stand where they stood at the start [s]."""
 STANDING = 10
 """Ticks before the plan begins to move."""
 FURTHER = 1.4
 """A change of the velocity at lift-off moves the feet by more than the flight alone says: the centre of
 mass has moved in the thrust already, and the landing places the feet ahead of it."""
 SHORTER = 0.041
-"""s; by how much the time without contact is shorter than the planned flight where a jump is as high as planned:
+"""Difference of the planned flight and the time without contact [s] where a jump is as high as planned:
 contacts end late and begin early, because feet are drawn up before they land. Over twelve tasks of BRUCE from 2 to
 18 cm, ahead, back, aside, turned, up and down, it is 35 to 47 ms in the robust trial."""
 SPEED_OF_TIME = 3.3
-"""m/s^2; the change of vertical velocity at lift-off that goes with a change of this time: for BRUCE 0.05 m/s
+"""Change of vertical velocity at lift-off with a change of this time [m/s^2]: for BRUCE 0.05 m/s
 with 15 ms. A ball's would be g / 2."""
 SETTLED = 0.15
-"""s after touchdown from which on the feet stand in their new place."""
+"""Time after touchdown from which on the feet stand in their new place [s]."""
 MOST_TILT = 0.35
-"""A tilt [rad] beyond this says no more than that it was too much."""
+"""Largest tilt from which a lesson is drawn [rad]; a larger one shows only that it was too large."""
 RUNGS = (0.02, 0.05, 0.08, 0.12)
-"""The rises of the jumps in place that come before the one that is asked for [m]."""
+"""Rises of the jumps in place that come before the requested one [m]."""
 Signals = Callable[[str], Array]
 """The values of a signal in every tick, by its name."""
 
 
 def ladder(asked: Mapping[str, float], rise: float) -> list[dict[str, float]]:
-    """Smaller jumps: in place, as high as the ``RUNGS`` and as asked, then half as far and turned."""
+    """Return smaller jumps: in place, as high as the ``RUNGS`` and as asked, then half as far and
+    turned."""
     found = [{"rise": rung} for rung in RUNGS if rung < rise - 0.005]
     half = {
         name: 0.5 * asked[name] for name in ("distance_x", "distance_y", "twist") if name in asked
@@ -70,8 +71,8 @@ def lesson_of(
     signals: Signals, plan: PlannedJump, mass: float, applied: tuple[Vector, Vector],
     measured_place: tuple[float, float] | None = None,
 ) -> Lesson | None:  # fmt: skip
-    """What one run teaches; ``None`` where its task cannot be learnt, such as a row of jumps, or it never
-    flew and landed.
+    """Return the lesson of one run; ``None`` where its task cannot be learnt, such as a row of
+    jumps, or it never flew and landed.
 
     Args:
         signals: of the run.
@@ -101,8 +102,8 @@ def lesson_of(
 
 
 def flight(signals: Signals) -> tuple[Array, float, float, NDArray[np.bool_], int]:
-    """The plan's time in every tick, its lift-off and touchdown [s], whether any point was loaded in every
-    tick, and the tick in the middle of the planned flight."""
+    """Return the plan's time in every tick, its lift-off and touchdown [s], whether any point was
+    loaded in every tick, and the tick in the middle of the planned flight."""
     time = np.asarray(signals("plan.reference.time"), np.float64)
     lifted = float(signals("plan.reference.lift_off_time")[0])
     landed = float(signals("plan.reference.touchdown_time")[0])
@@ -111,7 +112,8 @@ def flight(signals: Signals) -> tuple[Array, float, float, NDArray[np.bool_], in
 
 
 def landing_error(signals: Signals, measured_place: tuple[float, float] | None) -> Array | None:
-    """Actual minus planned: place ahead and to the left [m], roll, pitch and heading [rad], (5,).
+    """Compute actual minus planned: place ahead and to the left [m], roll, pitch and heading [rad],
+    (5,).
 
     The torso is planned to be level. ``None`` without a flight and a landing.
     """
@@ -143,7 +145,8 @@ def landing_error(signals: Signals, measured_place: tuple[float, float] | None) 
 
 
 def speed_error(signals: Signals) -> float:
-    """Actual minus planned vertical velocity at lift-off [m/s], of a run that flew and landed."""
+    """Compute actual minus planned vertical velocity at lift-off [m/s], of a run that flew and
+    landed."""
     time, lifted, landed, loaded, flying = flight(signals)
     ticks = int(np.argmax(loaded[flying:])) + int(np.argmax(loaded[:flying][::-1]))
     without_contact = ticks * float(time[1] - time[0])
@@ -151,7 +154,8 @@ def speed_error(signals: Signals) -> float:
 
 
 def moved_feet(signals: Signals, start: int, end: int, period: float) -> Array:
-    """By how much the middle of the feet moves between two ticks in both of which they stand [m, world], (3,).
+    """Integrate the motion of the middle of the feet between two ticks in both of which they stand
+    [m, world], (3,).
 
     The specific force is integrated twice, in the axes of the estimated orientation. At both ends the
     estimator knows the velocity from the legs; what the first integral misses of the last one is the mean
@@ -172,7 +176,7 @@ def moved_feet(signals: Signals, start: int, end: int, period: float) -> Array:
 
 
 def rotation_matrices(quaternions: Array) -> Array:
-    """The matrices of quaternions x, y, z, w, (n, 4) to (n, 3, 3)."""
+    """Convert quaternions x, y, z, w, (n, 4), to matrices (n, 3, 3)."""
     x, y, z, w = quaternions.T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -183,6 +187,6 @@ def rotation_matrices(quaternions: Array) -> Array:
 
 
 def _moved(feet: Array, start: int, end: int) -> tuple[float, float]:
-    """By how much the middle of the feet (ticks, feet, 3) moves between two ticks [m]."""
+    """Return the motion of the middle of the feet (ticks, feet, 3) between two ticks [m]."""
     x, y, _ = (np.asarray(feet[end]) - np.asarray(feet[start])).mean(axis=0)
     return float(x), float(y)

@@ -36,21 +36,22 @@ SEEDS = tuple(range(7001, 7013))
 TRIES = 5
 """Corrections that are tried after the run without any."""
 LEARNT = [0, 1, 3, 4, 5]
-"""What is learnt, of the velocity and the angular momentum in one array: not the upward velocity."""
+"""Indices that are learnt of the velocity and the angular momentum in one array: all but the upward
+velocity."""
 GAIN = 0.8
 """Share of the mean error that a try corrects; half of it after a try that did not help."""
 LARGEST = 0.08
-"""The largest correction along each axis [m/s]; of the momentum this speed at the lever."""
+"""The largest correction along each axis [m/s]; of the momentum this speed at the lever arm."""
 GYRATION = (0.22, 0.22, 0.15)
-"""About each axis, the radius of gyration [heights of the centre of mass] of a robot whose legs keep
+"""Radius of gyration about each axis [heights of the centre of mass] of a robot whose legs keep
 their feet in place: an angular momentum turns BRUCE by so much until touchdown."""
 LEAST_SHARE = 0.5
 """Of a momentum that is spread over more than about 200 deg of turn less than this share tilts one
-way; no more than its inverse is then asked for."""
+way; the correction is then its inverse at most."""
 LOST = 2.0
 """The share used by a run that fell or never landed; no run counts as more."""
 AFTER = 0.15
-"""s after touchdown in which the extremes of the tilt are looked for."""
+"""Time after touchdown in which the extremes of the tilt are searched [s]."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,8 @@ Measure = Callable[[Vector, Vector], Sequence[Touchdown]]
 
 
 def response(plan: PlannedJump, mass: float) -> Array:
-    """By how much what is ``LEARNT`` should change the errors of a ``Touchdown``, (5, 5).
+    """Compute the matrix (5, 5) from changes of the values ``LEARNT`` to the errors of a
+    ``Touchdown``.
 
     A velocity moves the landing by itself times the flight. An angular momentum k turns the robot
     at k / (m r^2) with r from ``GYRATION``; in roll and pitch it turns a robot that has the heading
@@ -96,7 +98,7 @@ def response(plan: PlannedJump, mass: float) -> Array:
 
 
 def angles_of(quaternions: Array) -> Array:
-    """Roll, pitch and heading [rad] of quaternions x, y, z, w, (..., 4) to (..., 3)."""
+    """Compute roll, pitch and heading [rad] of quaternions x, y, z, w, (..., 4) to (..., 3)."""
     x, y, z, w = np.moveaxis(quaternions, -1, 0)
     roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
@@ -156,7 +158,7 @@ def learn_landing(
 
 
 def _quality(runs: Sequence[Touchdown]) -> tuple[int, float]:
-    """How many runs landed, and the mean share used."""
+    """Return the number of runs that landed, and the mean share used."""
     return sum(run.lift_off.landed for run in runs), float(np.mean([run.used for run in runs]))
 
 
@@ -196,7 +198,7 @@ def run_landing(job: tuple[Path, Sequence[str]]) -> Touchdown:
 
 
 def touchdown_of(result: RunResult, allowed: Any) -> Touchdown:
-    """What a run missed at its landing.
+    """Measure a run's errors at its landing.
 
     Args:
         allowed: the parameters of its ``blocks.JumpScore``.

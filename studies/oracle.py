@@ -1,4 +1,4 @@
-"""What a perfect calibration would tell the controller of a simulated robot, from the simulator's own draws.
+"""A perfect calibration of a simulated robot, from the simulator's own draws.
 
 It bounds what a calibration can give: the values are exact, or wrong by errors of a given size.
 """
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..hal.random_streams import Purpose, stream
-from ..hal.simulated.imu_effects import draw_delays, draw_place
+from ..hal.simulated.imu_effects import draw_delays, draw_imu_pose
 from ..hal.simulated.parameters import SimulatorParameters
 from ..hal.simulated.variation import draw_variation
 from ..mathematics.arrays import Array
@@ -20,11 +20,11 @@ from ..robots.description import RobotDescription
 from ..runtime.graph import Graph
 
 CONSUMER = "controllers/late_sensors.yaml"
-"""The file that a graph includes so that its controller takes what is told."""
+"""The file that a graph includes so that its controller takes the values of a calibration."""
 
 
 class CalibrationErrors(NamedTuple):
-    """Standard deviations of what is told: shares of friction and of torque constants, ages [s], the IMU's
+    """Standard deviations of a calibration's values: shares of friction and of torque constants, ages [s], the IMU's
     place [m] and angle [rad]."""
 
     friction: float = 0.0
@@ -36,13 +36,13 @@ class CalibrationErrors(NamedTuple):
 
 EXACT = CalibrationErrors()
 CALIBRATED = CalibrationErrors(0.1, 0.02, 0.0002, 0.003, math.radians(0.3))
-"""What the calibration is meant to reach."""
+"""Errors that the calibration is meant to reach."""
 
 
 def oracle_values(
     graph: Graph, errors: CalibrationErrors = EXACT, block: str = "robot", seed: int = 0
 ) -> dict[str, Any]:
-    """The parameters of the controller, as overrides of the graph.
+    """Return the parameters of the controller, as overrides of the graph.
 
     Args:
         graph: with the simulated robot and ``CONSUMER``; its seed must be set.
@@ -66,7 +66,7 @@ def oracle_values(
 def _imu(
     params: SimulatorParameters, errors: CalibrationErrors, draw: np.random.Generator
 ) -> dict[str, Any]:
-    place, angle = map(np.array, draw_place(params.sensors.imu, params.seed))
+    place, angle = map(np.array, draw_imu_pose(params.sensors.imu, params.seed))
     return {
         "timing.imu_position": (place + errors.position * draw.normal(size=3)).tolist(),
         "timing.imu_rotation": (angle + errors.rotation * draw.normal(size=3)).tolist(),
@@ -74,7 +74,7 @@ def _imu(
 
 
 class ReadingAges(NamedTuple):
-    """By how much readings of slow motions are older than joint angles that arrive at once [s]."""
+    """Extra age of the readings of slow motions over joint angles that arrive at once [s]."""
 
     rate: float
     force: float
@@ -83,7 +83,7 @@ class ReadingAges(NamedTuple):
 
 
 def reading_ages(params: SimulatorParameters) -> ReadingAges:
-    """The ages of the simulated robot's readings, exactly as it computes them.
+    """Compute the ages of the simulated robot's readings, exactly as it does.
 
     Delays are whole steps of the physics, and filters are late by what their discrete form is late. The physics
     is integrated semi-implicitly, q[k+1] = q[k] + T v[k+1]: velocities, and specific forces that are their
@@ -106,7 +106,7 @@ def reading_ages(params: SimulatorParameters) -> ReadingAges:
 def _ages(
     params: SimulatorParameters, errors: CalibrationErrors, draw: np.random.Generator
 ) -> dict[str, Any]:
-    """The ages of the readings [s], and the delay that the controller must bridge."""
+    """Return the ages of the readings [s], and the delay that the controller must bridge."""
     band = params.actuators.motors.current_bandwidth
     ages = np.array(reading_ages(params))
     ages = np.maximum(0.0, ages + errors.age * draw.normal(size=4))
@@ -173,7 +173,7 @@ def _named(names: Sequence[str], values: Sequence[float] | Array) -> dict[str, f
 
 
 def _pack(params: SimulatorParameters, robot: RobotDescription) -> dict[str, Any]:
-    """The pack's resistance, so that its sag under load is no fault."""
+    """Return the pack's resistance, so that its sag under load is no fault."""
     if params.actuators.battery is None:
         return {}
     return {"safety.pack_resistance": params.actuators.battery.of(robot).resistance}

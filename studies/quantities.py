@@ -12,7 +12,8 @@ _QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*)$")
 
 
 def quantity(value: Any) -> tuple[float, str] | None:
-    """The number and the unit's text of ``15``, ``15 deg`` or ``0.7 N s``; ``None`` for others."""
+    """Parse the number and the unit's text of ``15``, ``15 deg`` or ``0.7 N s``; ``None`` for
+    others."""
     if isinstance(value, bool) or value is None:
         return None
     if isinstance(value, (int, float)):
@@ -28,7 +29,8 @@ def quantity(value: Any) -> tuple[float, str] | None:
 
 
 def in_unit(value: Any, unit: str) -> float | None:
-    """The quantity as a number in ``unit``; a bare number is taken as is. ``None`` for no quantity."""
+    """Convert the quantity to a number in ``unit``; a bare number is taken as is. ``None`` for no
+    quantity."""
     found = quantity(value)
     if found is None:
         return None
@@ -42,7 +44,7 @@ def in_unit(value: Any, unit: str) -> float | None:
 
 
 def written(number: float, unit: str) -> Any:
-    """The quantity as a parameter takes it: a number, or text with its unit."""
+    """Write the quantity as a parameter takes it: a number, or text with its unit."""
     # fifteen digits: sums of steps such as 0.1 come out as they would be written
     plain = float(f"{number:.15g}")
     whole: float | int = int(plain) if plain.is_integer() and abs(plain) < 1e15 else plain
@@ -50,6 +52,7 @@ def written(number: float, unit: str) -> Any:
 
 
 def column_name(axis: str, unit: str) -> str:
-    """``direction`` in ``deg`` is ``direction_deg``; ``m/s`` is ``_m_s``, as in metrics."""
+    """Name a column: ``direction`` in ``deg`` is ``direction_deg``; ``m/s`` is ``_m_s``, as in
+    metrics."""
     suffix = re.sub(r"[^0-9a-z]+", "_", unit.lower().replace("%", "percent")).strip("_")
     return f"{axis}_{suffix}" if suffix else axis

@@ -38,7 +38,7 @@ TASK_KEYS = ("graph", "set")
 
 
 def read_study(path: Path) -> Study:
-    """The study in a file.
+    """Read the study in a file.
 
     Raises:
         LoadError: something is wrong with the file; the text reports everything that is.
@@ -58,8 +58,9 @@ def read_study(path: Path) -> Study:
     return study
 
 
-def part_of(study: Study, texts: Sequence[str]) -> CellFilter:
-    """The filter that texts such as ``axis=value`` mean. Several values of one axis are alternatives.
+def rows_where(study: Study, texts: Sequence[str]) -> CellFilter:
+    """Return the filter that texts such as ``axis=value`` mean. Several values of one axis are
+    alternatives.
 
     Raises:
         LoadError: there is no such axis, or it has no such value.
@@ -180,7 +181,7 @@ def _read_tasks(keys: dict[str, Entry], path: Path, problems: Problems) -> tuple
 
 
 def _tasks_of(entry: Entry, path: Path, problems: Problems) -> tuple[StudyTask, ...]:
-    """The tasks of another study, which has to name them itself."""
+    """Read the tasks of another study, which has to name them itself."""
     if not isinstance(entry.value, ScalarNode):
         wrong_kind(entry.value, "'graphs_of'", "a study's file, relative to this one", problems)
         return ()
@@ -204,7 +205,7 @@ def _tasks_of(entry: Entry, path: Path, problems: Problems) -> tuple[StudyTask, 
 
 
 def _read_task(entry: Entry, path: Path, problems: Problems) -> StudyTask | None:
-    """``name: FILE`` or ``name: {graph: FILE, set: {...}}``."""
+    """Read ``name: FILE`` or ``name: {graph: FILE, set: {...}}``."""
     file = entry
     sets: tuple[Entry, ...] = ()
     if isinstance(entry.value, MapNode):
@@ -224,7 +225,8 @@ def _read_task(entry: Entry, path: Path, problems: Problems) -> StudyTask | None
 
 
 def _files(entry: Entry | None, path: Path, problems: Problems) -> list[tuple[Node, Path]]:
-    """The files that a key names, relative to the study's file. Missing files are noted as problems."""
+    """Read the files that a key names, relative to the study's file. Missing files are noted as
+    problems."""
     if entry is None:
         return []
     found = []
@@ -266,7 +268,8 @@ def _read_falsification(node: MapNode, labels: Labels, problems: Problems) -> Fa
 
 
 def _read_arm(entry: Entry, common: tuple[Range, ...], path: Path, problems: Problems) -> Arm:
-    """``name: {block.parameter: value}``, or ``name: {set: {...}, tune: {...}, include: FILE}``."""
+    """Read ``name: {block.parameter: value}``, or ``name: {set: {...}, tune: {...}, include:
+    FILE}``."""
     node = entry.value
     if isinstance(node, MapNode) and any(node.get(key) for key in ARM_KEYS):
         for item in node:

@@ -33,7 +33,8 @@ from .batch.seeds import overrides_for
 
 
 def trial_settings(trial: str, option: str = "--trial") -> dict[str, Any]:
-    """What a trial sets. What only other trials set goes back to the simulator's defaults.
+    """Return the settings of a trial. What only other trials set goes back to the simulator's
+    defaults.
 
     Raises:
         AloftError: there is no such trial.
@@ -73,13 +74,13 @@ TRIES = 2
 GAIN = 0.8
 """Share of the deviation that a try corrects; half of it after a try that was too much or did not help."""
 NEGLIGIBLE = 0.005
-"""A deviation that is not worth a correction [m/s]."""
+"""Deviation below which no correction is made [m/s]."""
 WORTH = 0.75
 """A correction is kept only if it leaves at most this share of the deviation."""
 LARGEST = 0.15
-"""The largest correction along each axis [m/s]; of the momentum this speed at the lever."""
+"""The largest correction along each axis [m/s]; of the momentum this speed at the lever arm."""
 LEVER = 1.0 / 3.0
-"""The lever, as a share of the height of the centre of mass, at which an angular momentum is
+"""The lever arm, as a share of the height of the centre of mass, at which an angular momentum is
 compared with a velocity: about the radius of gyration of a standing robot."""
 EARLY, FLIGHT = 0.1, 10
 """Contact may end that long before the planned lift-off [s]; a flight is that many ticks without."""
@@ -142,7 +143,7 @@ def learn(
 
 
 def deviation(runs: Sequence[LiftOff], unit: Array) -> Deviation:
-    """The mean over the runs that left the ground; see ``Deviation``."""
+    """Return the mean over the runs that left the ground; see ``Deviation``."""
     missed = np.array([run.missed for run in runs if run.missed is not None])
     landed = sum(run.landed for run in runs)
     if len(missed) == 0:
@@ -160,13 +161,14 @@ def deviation(runs: Sequence[LiftOff], unit: Array) -> Deviation:
 
 
 def parts_of(values: Array) -> tuple[Vector, Vector]:
-    """Of a correction (6,) the velocity's, and the angular momentum's."""
+    """Split a correction (6,) into the velocity's part and the angular momentum's."""
     x, y, z, kx, ky, kz = (float(value) for value in values)
     return (x, y, z), (kx, ky, kz)
 
 
 def corrected_parameters(graph: FlatGraph) -> dict[str, str]:
-    """The parameters of a graph that follow the plan's corrections, by what they follow.
+    """Return the parameters of a graph that follow the plan's corrections, by the correction that
+    each follows.
 
     Raises:
         AloftError: one of the two is followed by no parameter.
@@ -209,7 +211,8 @@ def in_all_worlds(
     path: Path, overrides: Sequence[str], parameters: dict[str, str], trial: str, seeds: Sequence[int],
     run: Callable[[tuple[Path, Sequence[str]]], Found], what: str,
 ) -> Callable[[Vector, Vector], list[Found]]:  # fmt: skip
-    """What runs a graph in a trial with a correction of velocity and one of angular momentum, on all processors.
+    """Return a function that runs a graph in a trial with a correction of velocity and one of
+    angular momentum, on all processors.
 
     Args:
         path, overrides, parameters: as ``rehearse`` takes them.
@@ -248,7 +251,7 @@ def run_once(job: tuple[Path, Sequence[str]]) -> LiftOff:
 
 
 def missed_at_lift_off(result: RunResult) -> Array | None:
-    """By how much the first lift-off of a run missed the plan, (6,); ``None`` without a flight.
+    """Return the error of a run's first lift-off from the plan, (6,); ``None`` without a flight.
 
     The upward velocity is compared by the apex that follows from it, as ``speed_error`` does: a
     robot that lifts off higher may be slower. The robot stands along the world's axes, as the plan

@@ -1,4 +1,4 @@
-"""A robot sways in a graph, or has swayed in a recording: what is read of the run, and what it says of the robot.
+"""Calibration of a robot from a run in which it sways, in a graph or from a recording.
 
 ``calibrated_fragment(graph, "sway.yaml")`` runs a graph in this process and returns the text that
 ``aloft robot calibrate`` writes.
@@ -25,7 +25,7 @@ PHASE = "phase.phase.phase"
 
 @dataclass(frozen=True)
 class SwayedRun:
-    """What a run says of its robot, one row a tick.
+    """The measurements of one run for the calibration, one row a tick.
 
     Attributes:
         robot: as it is described.
@@ -69,7 +69,8 @@ def swayed(
 def read_run(
     signals: Callable[[str], Any], period: float, robot: RobotDescription, block: str, command: str
 ) -> SwayedRun:
-    """What is needed of all signals, by their names. Raises ``KeyError`` where there is no such block or port."""
+    """Pick the signals of a run that the calibration needs, by their names. Raises ``KeyError``
+    where there is no such block or port."""
     position = signals(f"{block}.joints.position")
     motion = MeasuredRun(
         period, position, signals(f"{block}.joints.velocity"), signals(f"{block}.joints.torque"),
@@ -88,7 +89,8 @@ def read_run(
 
 
 def calibration_from(run: SwayedRun, weighed: float | None = None) -> Calibration:
-    """What a run says of its robot, of which a balance may have told the mass [kg]. Raises ``AloftError``."""
+    """Calibrate from a run, whose robot's mass [kg] may be known from a balance. Raises
+    ``AloftError``."""
     try:
         return calibrate_robot(run.robot, run.motion, run.voltage, run.asked, run.feedback, weighed)
     except IdentificationError as error:

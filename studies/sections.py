@@ -49,7 +49,7 @@ _SPACING = ("from", "to", "step")
 
 
 def read_axes(node: MapNode, problems: Problems) -> tuple[Axis, ...]:
-    """All axes in order. A wrong axis is noted as a problem and left out."""
+    """Read all axes in order. A wrong axis is noted as a problem and left out."""
     axes = []
     owners: dict[str, str] = {}
     for entry in node:
@@ -111,7 +111,7 @@ def _named(entry: Entry, cases: Entry, problems: Problems) -> Axis | None:
 
 
 def read_sets(entry: Entry, problems: Problems) -> tuple[Entry, ...] | None:
-    """The overrides in a mapping; there are none in an empty one."""
+    """Read the overrides in a mapping; there are none in an empty one."""
     if isinstance(entry.value, ScalarNode) and entry.value.value is None:
         return ()
     if not isinstance(entry.value, MapNode):
@@ -124,7 +124,7 @@ def read_sets(entry: Entry, problems: Problems) -> tuple[Entry, ...] | None:
 
 
 def _listed(entry: Entry, node: MapNode, problems: Problems) -> Axis | None:
-    """An axis of parameters with lists of values, which go side by side."""
+    """Read an axis of parameters with lists of values, which go side by side."""
     name = entry.key
     shown: list[Node] = []
     lists: list[tuple[Entry, list[Node]]] = []
@@ -190,7 +190,7 @@ def _make(
 
 
 def _values(entry: Entry, problems: Problems) -> list[Node] | None:
-    """A list, or evenly spaced quantities."""
+    """Read a list, or evenly spaced quantities."""
     node = entry.value
     if isinstance(node, ListNode) and node.items:
         return list(node.items)
@@ -260,7 +260,7 @@ class Labels:
     axes: Mapping[str, Axis]
 
     def read_filter(self, entry: Entry | None, problems: Problems) -> CellFilter:
-        """``where``: for some axes one value or a list of them."""
+        """Read ``where``: for some axes one value or a list of them."""
         if entry is None:
             return CellFilter()
         if not isinstance(entry.value, MapNode):
@@ -309,7 +309,7 @@ class Labels:
     def read_axis(
         self, entry: Entry | None, legal: Iterable[str], problems: Problems, default: str = ""
     ) -> str:
-        """The name of one of the ``legal`` axes."""
+        """Read the name of one of the ``legal`` axes."""
         if entry is None:
             return default
         name, names = plain(entry.value), tuple(legal)
@@ -329,7 +329,8 @@ class Labels:
 
 
 def read_goals(node: Node, labels: Labels, problems: Problems) -> tuple[Goal, ...]:
-    """Reads one success rate for all cells, or a list of goals. If several fit a cell, the last one counts."""
+    """Read one success rate for all cells, or a list of goals. If several fit a cell, the last one
+    counts."""
     if isinstance(node, ScalarNode):
         rate = _share(node, "goals", problems)
         return (Goal(rate),) if rate is not None else ()
@@ -368,7 +369,7 @@ def _share(node: Node, what: str, problems: Problems) -> float | None:
 
 
 def read_seeds(node: Node, what: str, problems: Problems) -> tuple[int, ...]:
-    """``2000:2040`` (2040 not among them), a list of numbers, or one."""
+    """Read ``2000:2040`` (2040 not among them), a list of numbers, or one."""
     value = plain(node)
     text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
     try:
@@ -384,7 +385,7 @@ def read_seeds(node: Node, what: str, problems: Problems) -> tuple[int, ...]:
 
 
 def read_tuning(node: MapNode, labels: Labels, problems: Problems) -> Tuning | None:
-    """Reads the section ``tune``, except its ranges."""
+    """Read the section ``tune``, except its ranges."""
     search = _read_search(node, "tune", TUNE_KEYS, labels, problems)
     given, least_of = node.get("seeds"), node.get("least")
     if given is None:
@@ -411,7 +412,7 @@ def read_tuning(node: MapNode, labels: Labels, problems: Problems) -> Tuning | N
 
 
 class _Search(NamedTuple):
-    """What ``tune`` and ``falsify`` have in common, except the ranges."""
+    """The common part of ``tune`` and ``falsify``: everything but the ranges."""
 
     seeds: tuple[int, ...]
     draws: int
@@ -457,7 +458,7 @@ def _read_search(
 def read_falsification(
     node: MapNode, ranges: tuple[Range, ...], labels: Labels, problems: Problems
 ) -> Falsification:
-    """Reads the section ``falsify``, whose ranges have been read."""
+    """Read the section ``falsify``, whose ranges have been read."""
     search = _read_search(node, "falsify", FALSIFY_KEYS, labels, problems)
     smallest = node.get("smallest")
     legal = tuple(each.key for each in ranges if each.scalar and not each.choices)
@@ -474,7 +475,7 @@ def read_falsification(
 
 
 def _read_margin(node: MapNode, problems: Problems) -> tuple[MarginTerm, ...]:
-    """``margin: {metric: [best, limit]}``."""
+    """Read ``margin: {metric: [best, limit]}``."""
     entry = node.get("margin")
     example = "margin: {peak_tilt_deg: [0, 45]}"
     if entry is None:
@@ -503,7 +504,7 @@ def _read_margin(node: MapNode, problems: Problems) -> tuple[MarginTerm, ...]:
 
 
 def read_plots(node: MapNode, labels: Labels, problems: Problems) -> tuple[Plot, ...]:
-    """The pictures, by the name of their files."""
+    """Read the pictures, by the name of their files."""
     plots = []
     for entry in node:
         if entry.key.startswith("_"):

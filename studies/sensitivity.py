@@ -1,4 +1,5 @@
-"""Which parameters of a graph decide a metric: elementary effects of all, Sobol indices of some.
+"""Sensitivity of a metric to the parameters of a graph: elementary effects of all, Sobol indices of
+some.
 
 A trajectory begins somewhere in the ranges and changes one parameter after the other; each change gives one
 elementary effect, dy over the share of the range. The mean of their sizes ranks the parameters, and their spread shows
@@ -33,7 +34,7 @@ Evaluate = Callable[[Array], Array]
 """The metric at points, (n, parameters) to (n,)."""
 MOST_BARS = 20
 DIGITS = 12
-"""Of values that are run, so that a run is the same on every machine."""
+"""Digits of the values that are run, so that a run is the same on every machine."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Varied:
 
 @dataclass(frozen=True)
 class Effect:
-    """What a parameter does to the metric over its range.
+    """The effect of a parameter on the metric over its range.
 
     Attributes:
         key: the parameter.
@@ -69,7 +70,7 @@ class Effect:
 
 
 def import_salib() -> Any:
-    """The package SALib. Raises ``AloftError`` where it is not installed."""
+    """Import the package SALib. Raises ``AloftError`` where it is not installed."""
     try:
         import SALib
         import SALib.analyze.morris
@@ -86,7 +87,7 @@ def import_salib() -> Any:
 def elementary_effects(
     varied: Sequence[Varied], evaluate: Evaluate, trajectories: int, seed: int
 ) -> list[Effect]:
-    """The effects of all parameters, the largest first."""
+    """Compute the effects of all parameters, the largest first."""
     salib, problem = import_salib(), _problem(varied)
     points = salib.sample.morris.sample(problem, trajectories, num_levels=4, seed=seed)
     found = salib.analyze.morris.analyze(problem, points, evaluate(points), num_levels=4, seed=seed)
@@ -98,7 +99,7 @@ def elementary_effects(
 def sobol_indices(
     varied: Sequence[Varied], evaluate: Evaluate, samples: int, seed: int
 ) -> dict[str, tuple[float, float, float, float]]:
-    """First index and half its interval, total index and half its, by parameter."""
+    """Compute first index and half its interval, total index and half its, by parameter."""
     salib, problem = import_salib(), _problem(varied)
     points = salib.sample.sobol.sample(problem, samples, calc_second_order=False, seed=seed)
     values = evaluate(points)
@@ -119,7 +120,8 @@ def _problem(varied: Sequence[Varied]) -> dict[str, Any]:
 def numeric_parameters(
     cell: Cell, spread: float, chosen: Sequence[str] = ("*",)
 ) -> tuple[list[Varied], list[str]]:
-    """The numbers among the parameters of a cell's graph within a share of their value.
+    """Return the numbers among the parameters of a cell's graph, ranged within a share of their
+    value.
 
     Args:
         cell: the graph with its overrides.
@@ -149,7 +151,7 @@ def numeric_parameters(
 
 
 def _loads(cell: Cell, key: str, value: float) -> bool:
-    """Whether the graph may run with a value."""
+    """Tell whether the graph may run with a value."""
     tried = cell.with_sets({key: value}, Position("the sensitivity", 0, 0))
     try:
         load_cell(tried.graph, tried.include, tried.sets, tried.origin, tried.behind)
@@ -159,7 +161,8 @@ def _loads(cell: Cell, key: str, value: float) -> bool:
 
 
 def metric_at(points: Array, varied: Sequence[Varied], metric: str, cell: Cell, seeds: Sequence[int], make: Make) -> Array:  # fmt: skip
-    """The mean of a metric over the seeds at each point; ``success`` is 1 for a run that succeeds.
+    """Compute the mean of a metric over the seeds at each point; ``success`` is 1 for a run that
+    succeeds.
 
     Raises:
         AloftError: a run has no such metric; the text names those that it has.
@@ -192,7 +195,7 @@ def _value(run: Run, metric: str) -> float:
 
 
 def write_chart(effects: Sequence[Effect], title: str, folder: Path) -> dict[str, str]:
-    """A chart of the effects with bars, as SVG and PNG; the paths by format."""
+    """Draw a chart of the effects with bars, as SVG and PNG, and return the paths by format."""
     shown = list(reversed(effects[:MOST_BARS]))
     indexed = [each for each in shown if each.total is not None]
     folder.mkdir(parents=True, exist_ok=True)
@@ -219,5 +222,5 @@ def write_chart(effects: Sequence[Effect], title: str, folder: Path) -> dict[str
 
 
 def as_data(effects: Sequence[Effect]) -> list[dict[str, Any]]:
-    """The effects as plain data."""
+    """Return the effects as plain data."""
     return [asdict(each) for each in effects]

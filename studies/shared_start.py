@@ -63,14 +63,14 @@ class SharedStart:
             raise
         self._trace.over = True
         self.skipped = 0
-        """Of the last run, the ticks that were not run."""
+        """Number of ticks of the last run that were not run."""
 
     def close(self) -> None:
         """Close all blocks."""
         self._run.close()
 
     def run(self, changes: Mapping[str, Any]) -> RunResult:
-        """The run with these live parameters, from its start to its end.
+        """Make the run with these live parameters, from its start to its end.
 
         Raises:
             LoadError: a change is wrong, or of a parameter that is not live.
@@ -96,8 +96,8 @@ class SharedStart:
 
 
 @dataclass(frozen=True)
-class _Places:
-    """Where a block's memory lies: bytes of the bus and of the state."""
+class _MemoryBytes:
+    """The places of a block's memory: bytes of the bus and of the state."""
 
     read: NDArray[np.intp]
     written: NDArray[np.intp]
@@ -132,11 +132,11 @@ class _Trace:
                 )  # fmt: skip
 
     def close(self) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
     def first_difference(self, path: str, start: Snapshot) -> int:
-        """The first tick in which a block, with its present parameters and on what it read in the shared
-        run, writes or remembers something else; after the last if there is none."""
+        """Find the first tick in which a block, with its present parameters and on its inputs in
+        the shared run, writes or remembers something else; after the last if there is none."""
         if path not in self._places:
             return 0
         bound, places, block = self._bound, self._places[path], self._bound.blocks[path]
@@ -161,14 +161,15 @@ class _Trace:
 
 
 def _is_all_declared(block: Block) -> bool:
-    """Whether a block is nothing but compiled kernels, which see no memory but the declared one."""
+    """Tell whether a block is nothing but compiled kernels, which see no memory but the declared
+    one."""
     kind = type(block)
     if kind.save_state is not Block.save_state or not can_be_chained(block):
         return False
     return not kind.is_moore() or can_be_chained(block, "update_calls")
 
 
-def _places(bound: BoundGraph, path: str) -> _Places:
+def _places(bound: BoundGraph, path: str) -> _MemoryBytes:
     spec = bound.graph.block(path)
     bus, state = bound.memory.bus.layout, bound.memory.state.layout
     kind = spec.block_type
@@ -184,7 +185,7 @@ def _places(bound: BoundGraph, path: str) -> _Places:
         spec.wires[name].source if name in spec.wires else f"{path}.{name}": port
         for name, port in kind.inputs.items()
     }
-    return _Places(
+    return _MemoryBytes(
         bytes_of(bus, read),
         bytes_of(bus, {f"{path}.{name}": port for name, port in kind.outputs.items()}),
         bytes_of(state, {f"{path}.{name}": port for name, port in kind.states.items()}),
@@ -197,8 +198,8 @@ _kept: dict[str, SharedStart | None] = {}
 
 
 def shared_result(work: Job) -> RunResult | None:
-    """The run of a draw, begun where it first differs from the run without the draw; ``None`` where it
-    has to be made from its start, with its graph loaded anew."""
+    """Make the run of a draw from the tick where it first differs from the run without the draw;
+    ``None`` where it has to be made from its start, with its graph loaded anew."""
     if not work.drawn:
         return None
     key = repr((replace(work, drawn={}), tuple(work.drawn)))
@@ -230,7 +231,7 @@ def shared_result(work: Job) -> RunResult | None:
 
 
 def _shared_start(work: Job) -> SharedStart | None:
-    """The shared run of a job, where all that it draws is live."""
+    """Return the shared run of a job, if all that it draws is live."""
     try:
         graph = seeded_graph(replace(work, drawn={}))
         specs = {spec.path: spec for spec in graph.checked.blocks}

@@ -16,7 +16,7 @@ FIRST_REPORT_SEED = 1000
 """Gains are tuned on the seeds below, and reported on those from here on."""
 
 Coordinate = float | int | str | bool
-"""Where a run lies on an axis."""
+"""A run's position on an axis."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class CellFilter:
     labels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def takes(self, labels: Mapping[str, str]) -> bool:
-        """Whether the filter includes a cell with these labels."""
+        """Tell whether the filter includes a cell with these labels."""
         return all(labels[axis] in allowed for axis, allowed in self.labels.items())
 
 
@@ -126,7 +126,7 @@ class Falsification:
     ranges: tuple[Range, ...]
     margin: tuple[MarginTerm, ...]
     seeds: tuple[int, ...] = ()
-    """Those of every draw; empty for the study's."""
+    """Seeds of every draw; empty for the study's."""
     seed: int = 0
     cells: CellFilter = CellFilter()
     sets: tuple[Entry, ...] = ()
@@ -175,7 +175,7 @@ class Study:
         return ("task", "arm", *(axis.name for axis in self.axes))
 
     def labels_of(self, axis: str) -> tuple[str, ...]:
-        """The labels of an axis, in order."""
+        """Return the labels of an axis, in order."""
         if axis == "task":
             return tuple(task.name for task in self.tasks)
         if axis == "arm":
@@ -183,5 +183,5 @@ class Study:
         return tuple(c.label for a in self.axes if a.name == axis for c in a.cases)
 
     def axis(self, name: str) -> Axis | None:
-        """The axis of the grid called ``name``."""
+        """Return the axis of the grid called ``name``."""
         return next((axis for axis in self.axes if axis.name == name), None)

@@ -22,7 +22,7 @@ Z_95 = 1.959963984540054
 
 
 def wilson_interval(successes: int, n: int, z: float = Z_95) -> tuple[float, float]:
-    """The score interval of E. B. Wilson (1927) for a probability of success.
+    """Compute the score interval of E. B. Wilson (1927) for a probability of success.
 
         centre = (p + z^2 / 2n) / (1 + z^2 / n)
         half   = z / (1 + z^2 / n) sqrt(p (1 - p) / n + z^2 / 4n^2)
@@ -57,7 +57,7 @@ class Figures:
     high: float
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data."""
+        """Return the figures as plain data."""
         return dict(vars(self))
 
 
@@ -74,7 +74,7 @@ class StudyRow:
     goal: float | None
     metrics: Mapping[str, Figures]
     reasons: Mapping[str, int]
-    """Why runs did not succeed, the most frequent first."""
+    """Reasons of runs that did not succeed, the most frequent first."""
 
     @property
     def rate(self) -> float:
@@ -83,11 +83,11 @@ class StudyRow:
 
     @property
     def met(self) -> bool | None:
-        """Whether the rate reaches the goal."""
+        """True if the rate reaches the goal."""
         return None if self.goal is None else self.n > 0 and self.rate >= self.goal - 1e-12
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data; the coordinates are keys of their own."""
+        """Return the row as plain data; the coordinates are keys of their own."""
         return {
             "task": self.cell.task, "arm": self.cell.arm, **self.cell.coordinates,
             "n": self.n, "successes": self.successes, "errors": self.errors, "rate": self.rate,
@@ -98,7 +98,8 @@ class StudyRow:
 
 
 def summarise(study: Study, runs: Sequence[Run]) -> list[StudyRow]:
-    """One row for each cell, in the order of the study, with Wilson's 95 % interval of its success rate."""
+    """Return one row for each cell, in the order of the study, with Wilson's 95 % interval of its
+    success rate."""
     by_cell: dict[int, list[Run]] = {}
     for run in runs:
         by_cell.setdefault(id(run.cell), []).append(run)
@@ -133,7 +134,7 @@ def _row(study: Study, runs: Sequence[Run]) -> StudyRow:
 
 
 def figures_of(values: Sequence[float]) -> Figures:
-    """The median and the quantiles of at least one value."""
+    """Compute the median and the quantiles of at least one value."""
     ordered = sorted(values)
     return Figures(
         len(ordered),
@@ -145,7 +146,7 @@ def figures_of(values: Sequence[float]) -> Figures:
 
 
 def quantile(ordered: Sequence[float], share: float) -> float:
-    """The quantile of sorted values, linear between them."""
+    """Compute the quantile of sorted values, linear between them."""
     place = share * (len(ordered) - 1)
     low = math.floor(place)
     high = min(low + 1, len(ordered) - 1)
@@ -153,8 +154,9 @@ def quantile(ordered: Sequence[float], share: float) -> float:
 
 
 def make_table(runs: Sequence[Run]) -> pyarrow.Table:
-    """The table: ``task``, ``arm``, a column for every axis, ``seed``, ``tuning_seed`` (whether
-    it is one), ``success``, ``reason``, ``error``, ``run_hash``, every metric, ``wall_time_s``.
+    """Make the table: ``task``, ``arm``, a column for every axis, ``seed``, ``tuning_seed``
+    (whether it is one), ``success``, ``reason``, ``error``, ``run_hash``, every metric,
+    ``wall_time_s``.
 
     A metric that a run does not have is null. The same runs give the same table, except its last
     column, no matter which processes made them and how often the study was interrupted.
@@ -185,7 +187,7 @@ def make_table(runs: Sequence[Run]) -> pyarrow.Table:
 
 
 def _array(values: list[Any]) -> pyarrow.Array:
-    """The values as an array of one type: truth values, integers, numbers, or else texts."""
+    """Return the values as an array of one type: truth values, integers, numbers, or else texts."""
     import pyarrow
 
     there = [value for value in values if value is not None]

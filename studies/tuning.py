@@ -51,7 +51,7 @@ EXPECTED = "[low, high], [[low, high], ...], {from:, to:, log: true} or {choices
 
 
 def read_range(entry: Entry, problems: Problems) -> Range | None:
-    """The range of one parameter; ``None`` if it is wrong, which is noted as a problem."""
+    """Read the range of one parameter; ``None`` if it is wrong, which is noted as a problem."""
     node = entry.value
     if isinstance(node, MapNode):
         choices = node.get("choices")
@@ -111,7 +111,7 @@ def _refuse(entry: Entry, node: Node, problems: Problems, log: bool = False) -> 
 
 
 def value_at(found: Range, shares: Sequence[float]) -> Any:
-    """The value at a share, from 0 to 1, of each of its numbers' ranges."""
+    """Return the value at a share, from 0 to 1, of each of its numbers' ranges."""
     values = []
     for (low, high), share in zip(found.bounds, shares, strict=True):
         if found.log:
@@ -124,7 +124,7 @@ def value_at(found: Range, shares: Sequence[float]) -> Any:
 
 
 def corners(found: Range) -> tuple[Any, ...]:
-    """The values at the ends of the range, with which every graph is checked before tuning."""
+    """Return the values at the ends of the range, with which every graph is checked before tuning."""
     if found.choices:
         return found.choices
     ends = [[written(pair[end], found.unit) for pair in found.bounds] for end in (0, 1)]
@@ -144,7 +144,7 @@ class Draw:
 
 
 def tuning_cells(study: Study) -> list[Cell]:
-    """The cells that every draw of an arm is tried on, as they are written."""
+    """Return the cells that every draw of an arm is tried on, as they are written."""
     assert study.tuning is not None
     tuning = study.tuning
     expanded = cells(study, common=tuning.sets)
@@ -152,7 +152,7 @@ def tuning_cells(study: Study) -> list[Cell]:
 
 
 def extreme_cells(study: Study, chosen: Sequence[Cell]) -> list[Cell]:
-    """Cells with every range of tuning at its ends. They are checked before anything runs."""
+    """Return cells with every range of tuning at its ends. They are checked before anything runs."""
     found = []
     for arm in study.arms:
         first = next((cell for cell in chosen if cell.arm == arm.name), None)
@@ -161,14 +161,14 @@ def extreme_cells(study: Study, chosen: Sequence[Cell]) -> list[Cell]:
 
 
 def cells_at_ends(cell: Cell, ranges: Sequence[Range]) -> list[Cell]:
-    """The cell with each of the ranges at its ends."""
+    """Return the cell with each of the ranges at its ends."""
     return [cell.with_sets({each.key: e}, each.where) for each in ranges for e in corners(each)]
 
 
 def draw_runs(
     values: Mapping[str, Any], where: str, mine: Sequence[Cell], seeds: Sequence[int]
 ) -> list[Run]:
-    """The runs of one set of parameters on checked cells; ``where`` names it in errors."""
+    """Return the runs of one set of parameters on checked cells; ``where`` names it in errors."""
     found = []
     for cell in mine:
         tried = replace(cell.with_sets(values, Position(where, 0, 0)), base=cell.sets)
@@ -180,13 +180,13 @@ def draw_runs(
 
 
 def order(found: Draw) -> tuple[float, float, int]:
-    """What is least for the best draw."""
+    """Return the sorting key of a draw: the least is the best."""
     least = math.inf if math.isnan(found.least) else found.least
     return -found.successes, least, found.number
 
 
 def scored(found: Draw, runs: Sequence[Run], least: str) -> Draw:
-    """The draw with the results of its runs."""
+    """Score the draw by the results of its runs."""
     outcomes = [run.outcome for run in runs if run.outcome is not None]
     values = [float(o.metrics[least]) for o in outcomes if o.metrics.get(least) is not None]
     mean = math.fsum(values) / len(values) if values else math.nan
@@ -195,12 +195,12 @@ def scored(found: Draw, runs: Sequence[Run], least: str) -> Draw:
 
 
 def tuned_path(study: Study) -> Path:
-    """The path of the file with the tuned parameters, beside the study's file."""
+    """Return the path of the file with the tuned parameters, beside the study's file."""
     return study.path.with_name(f"{study.path.stem}.tuned.yaml")
 
 
 def definition(study: Study) -> str:
-    """A hash of everything that defines the search: the cells, the ranges, the seeds and the draws."""
+    """Hash everything that defines the search: the cells, the ranges, the seeds and the draws."""
     assert study.tuning is not None
     tuning = study.tuning
     searched: list[Any] = [list(tuning.seeds), tuning.draws, tuning.seed, tuning.least]
@@ -240,7 +240,7 @@ def write_tuned(study: Study, best: Mapping[str, Draw]) -> Path:
 
 
 def read_tuned(study: Study) -> Tuned:
-    """The tuned parameters of every arm; empty for a study without a section ``tune``.
+    """Read the tuned parameters of every arm; empty for a study without a section ``tune``.
 
     Raises:
         AloftError: the study has not been tuned, or has been changed since.
@@ -275,14 +275,14 @@ Make = Callable[[Sequence[Run]], list[Run]]
 
 
 def runs_of_search(study: Study, chosen: Sequence[Cell]) -> int:
-    """How many runs the search takes on these cells."""
+    """Return the number of runs that the search takes on these cells."""
     assert study.tuning is not None
     draws = {arm.name: study.tuning.draws if arm.ranges else 1 for arm in study.arms}
     return sum(draws[cell.arm] for cell in chosen) * len(study.tuning.seeds)
 
 
 def search(study: Study, chosen: Sequence[Cell], make: Make) -> dict[str, Draw]:
-    """The best draw of every arm.
+    """Search for the best draw of every arm.
 
     Args:
         study: the study, with a section ``tune``.
@@ -331,13 +331,14 @@ def search(study: Study, chosen: Sequence[Cell], make: Make) -> dict[str, Draw]:
 
 
 def value_to_minimise(found: Draw, runs: int) -> float:
-    """One number that orders draws as ``order`` does: failures first, then the metric, in (0, 1)."""
+    """Compute one number that orders draws as ``order`` does: failures first, then the metric, in
+    (0, 1)."""
     share = 1.0 if math.isnan(found.least) else 0.5 + math.atan(found.least) / math.pi
     return runs - found.successes + share
 
 
 def proposed(each: Range, trial: Trial) -> Any:
-    """The value of a range that a trial proposes."""
+    """Return the value of a range that a trial proposes."""
     if each.choices:
         return each.choices[trial.suggest_categorical(each.key, list(range(len(each.choices))))]
     shares = [trial.suggest_float(f"{each.key} {i}", 0.0, 1.0) for i in range(len(each.bounds))]
@@ -345,7 +346,8 @@ def proposed(each: Range, trial: Trial) -> Any:
 
 
 def optuna_study(verb: str, seed: str, *, random: bool = False) -> OptunaStudy:
-    """What proposes draws: a tree-structured Parzen estimator, or for comparison chance alone.
+    """Return a study that proposes draws: by a tree-structured Parzen estimator, or for comparison
+    at random.
 
     Args:
         verb: the verb that needs it.

@@ -23,8 +23,8 @@ a fall."""
 
 
 def worst_first(runs: Sequence[Run]) -> list[Run]:
-    """All runs that were made: those that broke, those that failed, those that succeeded; among equal
-    ones those that tilted most come first, and then the order of the study counts."""
+    """Sort all runs that were made: those that broke, those that failed, those that succeeded;
+    among equal ones those that tilted most come first, and then the order of the study counts."""
     made = [run for run in runs if run.outcome is not None]
     return sorted(made, key=_rank)
 
@@ -37,20 +37,20 @@ def _rank(run: Run) -> tuple[int, float]:
 
 
 def tilt_of(outcome: Outcome) -> float | None:
-    """How far the robot leant at most [deg], where that is known."""
+    """Return the robot's largest tilt [deg], where that is known."""
     tilt = outcome.metrics.get(TILT)
     return float(tilt) if isinstance(tilt, int | float) and not isnan(tilt) else None
 
 
 def labels_of(run: Run) -> str:
-    """Where the run is in the study: ``task up_5cm, arm shipped, force 70, seed 7003``."""
+    """Describe the run's place in the study: ``task up_5cm, arm shipped, force 70, seed 7003``."""
     cell = run.cell
     names = {"task": cell.task, "arm": cell.arm, **cell.coordinates, "seed": run.seed}
     return ", ".join(f"{name} {value}" for name, value in names.items() if value not in ("", None))
 
 
 def chosen_run(runs: Sequence[Run], number: int) -> Run:
-    """The run with that number of the list, which begins with 1.
+    """Return the run with that number of the list, which begins with 1.
 
     Raises:
         AloftError: there is no such number.
@@ -64,7 +64,7 @@ def chosen_run(runs: Sequence[Run], number: int) -> Run:
 
 
 def file_name(run: Run) -> str:
-    """A name for the run's recording."""
+    """Return a name for the run's recording."""
     return re.sub(r"[^A-Za-z0-9_.+-]+", "_", labels_of(run)).strip("_") + ".rrd"
 
 
@@ -113,5 +113,5 @@ def _tilt(run: Run) -> str:
 
 
 def with_outcomes(runs: Sequence[Run], outcomes: Mapping[str, Outcome]) -> list[Run]:
-    """The runs with the outcomes of a journal, without those that were not made."""
+    """Return the runs with the outcomes of a journal, without those that were not made."""
     return [replace(run, outcome=outcomes[run.key]) for run in runs if run.key in outcomes]

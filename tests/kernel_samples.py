@@ -522,7 +522,7 @@ UNUSED["aloft.blocks.jumping.moved_landing.turn_feet"] = (
 )
 UNUSED["aloft.blocks.jumping.moved_landing.thrust_motion"] = *records(MOVED), 1, 1.0, 0.95
 UNUSED["aloft.blocks.jumping.moved_landing.fastest_change"] = 0.5, 3.0, 0.15
-UNUSED["aloft.blocks.jumping.moved_landing.throw"] = (
+UNUSED["aloft.blocks.jumping.moved_landing.add_velocity_change"] = (
     *records(MOVED), 0, 0.04, *records({**STEERED_JUMP, "time": 0.85}, RETARGETED), 0.05,
 )  # fmt: skip
 UNUSED["aloft.blocks.jumping.moved_landing.place_feet"] = *records(MOVED), 1, 0.05, 0.03
@@ -546,7 +546,7 @@ UNUSED["aloft.blocks.jumping.steered_plan.is_at_rest"] = (
     *records({**STANDING, "com_velocity": NORMAL(3)}, STANDING), 0.05,
     *records({"middle": np.zeros(3), "middle_rate": np.zeros(3), "vector": np.zeros(3)}),
 )  # fmt: skip
-UNUSED["aloft.blocks.jumping.landing_heuristic.come_early"] = (
+UNUSED["aloft.blocks.jumping.landing_heuristic.early_touchdown_offset"] = (
     *records(
         {"lift_off_time": 1.0, "touchdown_time": 1.3, "time": 1.27},
         {"foot_position": NORMAL((2, 3)), "contact_position": NORMAL((4, 3))},
@@ -565,8 +565,8 @@ HOPPING = {
 UNUSED["aloft.blocks.jumping.speed_plan.tell_goal"] = records(
     HOPPING, {"position": np.zeros(2), "heading": 0.0, "height": 0.0, "number": 0, "outcome": 0}
 )
-UNUSED["aloft.blocks.jumping.speed_plan.hat"] = np.array([0.0, 0.1, 0.2]), 1, 0.07
-UNUSED["aloft.blocks.jumping.speed_plan.land"] = (
+UNUSED["aloft.blocks.jumping.speed_plan.triangle_weight"] = np.array([0.0, 0.1, 0.2]), 1, 0.07
+UNUSED["aloft.blocks.jumping.speed_plan.begin_next_jump"] = (
     0.12, 0.05, 30, ROWS_OF_SPEEDS, *records(HOPPING),
 )  # fmt: skip
 UNUSED["aloft.blocks.jumping.speed_plan.mix_rows"] = (

@@ -25,7 +25,7 @@ NEEDS_DRIVES = {
     "hal.BearRobot": "needs drives on serial ports; hal.TwinRobot is the same driver without them",
 }
 NEEDS_TERMINAL = {"hal.Keyboard": "needs a terminal; checked with one in its own test"}
-NEEDS_LIBRARY = {"blocks.Library": "needs an exported library; checked with some in its own test"}
+NEEDS_LIBRARY = {"blocks.CLibrary": "needs an exported library; checked with some in its own test"}
 BEYOND = {
     ("go2", "blocks.SpeedPlan"): "no row of jumps of 0 m can be planned",
     ("bolt", "hal.MujocoRobot"): "its centre of mass is .* outside its contact points",

@@ -23,7 +23,7 @@ blocks:
   noise: {use: blocks.WhiteNoise, with: {std: 0.1, unit: m/s}}
   speed: {use: blocks.Sum, in: {a: action.y, b: noise.y}}
   place: {use: blocks.Integrator, in: {u: speed.y}}
-  cost: {use: blocks.Function, with: {function: square}, in: {u: place.y}}
+  cost: {use: blocks.Expression, with: {expression: a ** 2}, in: {a: place.y}}
   reward: {use: blocks.Gain, with: {gain: -1}, in: {u: cost.y}}
   bounds: {use: blocks.Assertion, with: {upper: 0.3}, in: {u: place.y}}
 """

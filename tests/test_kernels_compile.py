@@ -54,7 +54,7 @@ NOT_HOT = {
     "mathematics.linear_algebra.product": "before a run, when tables are made",
     "mathematics.compiling.expressions.cross": "stands for loops in an equation",
     "mathematics.compiling.chain_code.rows_of": "a view, when calls are bound",
-    "mathematics.compiling.library_call._caller": "makes machine code, when calls are bound",
+    "mathematics.compiling.foreign_call._caller": "makes machine code, when calls are bound",
     "mathematics.compiling.compile_calls._tell": "says how far compiling is, before a run",
     "mathematics.body_dynamics.inertias": "memory, when a block is set up",
     "mathematics.body_dynamics.body_motion": "memory, when a block is set up",
@@ -167,7 +167,9 @@ def steer_alone():
     score = BlockBench(find_block("blocks.CourseScore"), robot=bruce, plain=True)
     plan.set("terms", foot_rotation=np.tile(np.eye(3), (2, 1, 1)))
     plan.set("command", number=1, ahead=0.1)
-    plan.set("part", number=1, parts=1, time=np.arange(20) * 0.1, jump=[0.2, 0.4, 0.6], outcome=2)
+    plan.set(
+        "segment", number=1, segments=1, time=np.arange(20) * 0.1, jump=[0.2, 0.4, 0.6], outcome=2
+    )
     score.set("truth", base_position=[0.0, 0.0, 0.4], base_orientation=[0.0, 0.0, 0.0, 1.0])
     for tick in range(400):
         plan.step()

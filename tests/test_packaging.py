@@ -20,7 +20,7 @@ from aloft.mathematics.compiling.machine_code import process_triple
 
 ROOT = Path(__file__).parent.parent
 NOT_SHIPPED = {
-    "benchmarks", "tests", "docs", "scripts", "recordings", "build", "dist", "aloft_robotics.egg-info",
+    "benchmarks", "tests", "docs", "scripts", "lab", "recordings", "build", "dist", "aloft_robotics.egg-info",
 }  # fmt: skip
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 LISTED = PROJECT["tool"]["setuptools"]["packages"]

@@ -1,1 +1,1 @@
-"""Jumps that nobody chose: random tasks, planned and run in closed loop."""
+"""Random jumping tasks, planned and run in closed loop."""

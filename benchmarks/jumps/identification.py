@@ -60,7 +60,7 @@ Errors = tuple[list[float], list[float]]
 
 
 def identification(seeds: Sequence[int] = SEEDS, workers: int = 0) -> list[Row]:
-    """Rows: for each quantity the root mean square of its errors over the robots.
+    """Measure for each quantity the root mean square of its errors over the robots.
 
     ``results/real_robot/identification.json`` has each robot that is done.
 
@@ -116,7 +116,7 @@ def errors_of(found: Calibration, graph: Graph) -> dict[str, Errors]:
     true = oracle_values(graph)
 
     def ratio(values: Mapping[str, Value], drawn: Array) -> Errors:
-        """Errors as percentages of the truth."""
+        """Express errors as percentages of the truth."""
         return _errors([*values.values()], drawn, 100.0 / drawn)
 
     def one(value: Value, drawn: float, scale: float) -> Errors:

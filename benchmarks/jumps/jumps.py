@@ -1,4 +1,4 @@
-"""Jumps that nobody chose, in closed loop: random tasks are planned and run in the robust trial.
+"""Random jumping tasks, planned and run in closed loop in the robust trial.
 
 Each task of ``random_tasks`` is planned from nothing, with one recipe for all, and its plan is run in
 ``graphs/jump.yaml`` with the robust trial once a seed; ground and expectation follow from the task.
@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from ...mathematics.constants import GRAVITY
-from ...planner.checking.validity import InvalidPlanError, why_not
+from ...planner.checking.validity import InvalidPlanError, failure_text
 from ...planner.library.library import PlanLibrary, shipped_folder, solve_and_check
 from ...planner.solving.solve import make_problem
 from ...planner.solving.solver_process import cpu_time
@@ -43,7 +43,7 @@ TRIAL = "robust"
 LANDED_GOAL = 0.05
 """The largest good share of planned jumps that do not land."""
 MEDIAN_GOAL, MOST_GOAL, WORST_GOAL = 0.3, 1.5, 5.0
-"""s; CPU time of planning: the median's, that of 95 % of the tasks, and the worst."""
+"""CPU time of planning [s]: the median's, that of 95 % of the tasks, and the worst."""
 
 
 LAST_PUSH, PUSH_TIME = 0.9, 0.01
@@ -72,7 +72,7 @@ def jumps(
     trial: str = TRIAL,
     push: float = 0.0,
 ) -> list[Row]:
-    """Rows: the share of tasks without a plan, and what binds; of runs that do not land, with its
+    """Measure the share of tasks without a plan, and what binds; of runs that do not land, with its
     95 % interval; and the CPU time of planning, from nothing to checked."""
     tasks = random_tasks(count, seed, harder)
     code = code_fingerprint()
@@ -136,7 +136,7 @@ def plan_and_run(job: JumpJob) -> list[tuple[str, Outcome]]:
         try:
             library.add(solve_and_check(job.task, robot))
         except (InvalidPlanError, PlanError, JumpTaskError) as error:
-            reason = why_not(error)
+            reason = failure_text(error)
         found.append(("", Outcome(not reason, reason, metrics={"cpu_s": cpu_time() - started})))
         if reason:
             return found
@@ -150,7 +150,7 @@ def run_key(trial: str, push: float, seed: int) -> str:
 
 
 def run_once(job: JumpJob, seed: int) -> Outcome:
-    """One run of a planned task."""
+    """Make one run of a planned task."""
     jumping = pushed_jumps(job, seed) if job.push else bruce_jumps(job.trial)
     return jumping.run(job.task, job.folder, seed)
 

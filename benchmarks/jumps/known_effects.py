@@ -45,7 +45,7 @@ class EffectJob:
 def known_effects(
     seeds: Sequence[int] = SEEDS, asked: Sequence[str] = (), workers: int = 0
 ) -> list[Row]:
-    """Rows: for each effect and jump the share of robots that do not land.
+    """Measure for each effect and jump the share of robots that do not land.
 
     ``results/real_robot/effects.json`` has the counts of all that are done, in the order of the seeds.
 

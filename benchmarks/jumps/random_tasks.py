@@ -1,4 +1,4 @@
-"""The planner's success on jumps that nobody chose: tasks that are drawn by a seed.
+"""The planner's success on random jumping tasks, drawn by a seed.
 
 The range, uniform and independent unless said; all is for BRUCE's real actuators and the usual recipe:
 
@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.checking.validity import InvalidPlanError, why_not
+from ...planner.checking.validity import InvalidPlanError, failure_text
 from ...planner.library.library import solve_and_check
 from ...planner.solving.solver_process import cpu_time
 from ...planner.task.files import PlanError
@@ -40,7 +40,7 @@ from ..rows import Row
 
 COUNT, SEED = 200, 1
 MEDIAN_GOAL, MOST_GOAL, WORST_GOAL = 0.3, 1.5, 5.0
-"""s of processor time"""
+"""Processor time of planning [s]: the median's, that of 95 % of the tasks, and the worst."""
 MISSED_GOAL = 0.05
 """The largest good share of tasks without a valid plan."""
 
@@ -116,8 +116,8 @@ _HARDER: dict[str, Any] = {
 
 
 def random_rows(count: int = COUNT, seed: int = SEED) -> list[Row]:
-    """Rows: the share of tasks without a valid plan, and the CPU time of a valid one, from nothing
-    to checked, refined where the check asked for it."""
+    """Measure the share of tasks without a valid plan, and the CPU time of a valid one, from
+    nothing to checked, refined where the check asked for it."""
     robot = find_robot("bruce")
     seconds, missed = [], list[str]()
     for task in random_tasks(count, seed):
@@ -145,5 +145,5 @@ def plan_one(task: JumpTask, robot: RobotDescription) -> str:
     try:
         solve_and_check(task, robot)
     except (InvalidPlanError, PlanError) as error:
-        return why_not(error)
+        return failure_text(error)
     return ""

@@ -71,7 +71,7 @@ def real_robot(
     seeds: Sequence[int] = SEEDS, arms: Sequence[str] = (), asked: Sequence[str] = (), workers: int = 0,
     robot: str = "bruce",
 ) -> list[Row]:  # fmt: skip
-    """Rows: for each jump and arm the share of robots that do not land the last time.
+    """Measure for each jump and arm the share of robots that do not land the last time.
 
     Args:
         seeds: of the robots.

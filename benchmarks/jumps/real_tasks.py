@@ -1,4 +1,4 @@
-"""The jumps that robots as a bench finds them are asked for, in their order."""
+"""The tasks of robots as a bench finds them, in their order."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ ASKED: Mapping[str, AskedJump] = {
 RANDOM, PUSH, TEN = "random task", "pushed in flight", "ten in a row"
 SEEN = "ten in a row, place measured"
 EVERY = (*ASKED, RANDOM, PUSH, TEN, SEEN)
-"""All that is asked for, in the order in which a robot does it."""
+"""All tasks, in the order in which a robot does them."""
 
 
 def _others(
@@ -87,7 +87,7 @@ ASKED_OF_OTHERS: Mapping[str, Mapping[str, AskedJump]] = {
     "g1": _others("g1", "in place 5 cm", "ahead 8 cm", 0.05, 0.08),
     "solo12": _others("solo12", "in place 10 cm", "ahead 15 cm", 0.1, 0.15),
 }
-"""The jumps that robots other than BRUCE are asked for."""
+"""The tasks of robots other than BRUCE."""
 
 
 def asked_of(seed: int, robot: str = "bruce") -> Mapping[str, AskedJump]:
@@ -102,7 +102,7 @@ def asked_of(seed: int, robot: str = "bruce") -> Mapping[str, AskedJump]:
         RANDOM: AskedJump(random_task(seed), times=4),
         PUSH: AskedJump({"rise": 0.12}, "push_12cm.yaml", 1, {"push.angle": angle}),
         TEN: AskedJump(ten, "hops.yaml", 1),
-        SEEN: AskedJump(ten, "hops.yaml", 1, behind="controllers/place_sensor.yaml"),
+        SEEN: AskedJump(ten, "hops.yaml", 1, behind="controllers/pose_sensor.yaml"),
     }
 
 

@@ -37,8 +37,8 @@ def expected_delay(delay: float, jitter: float = 0.0) -> float:
 
 
 def jump(delay: float, seed: int, jitter: float = 0.0, loss: float = 0.0) -> VirtualRun:
-    """One jump with links that take from ``delay`` to ``delay + jitter`` each way [s], and lose the
-    share ``loss`` of their messages."""
+    """Make one jump with links that take from ``delay`` to ``delay + jitter`` each way [s], and
+    lose the share ``loss`` of their messages."""
     settings = [*SETTINGS, f"robot.seed={seed}", f"delay.nominal={expected_delay(delay, jitter)!r}"]
     graph = load(GRAPH, settings)
     phase = float(np.random.default_rng(seed).random())

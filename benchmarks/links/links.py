@@ -31,7 +31,7 @@ from ...runtime.links.lockstep_link import LockstepReceiver
 from ...runtime.links.message import HEADER, MessageReader, MessageWriter
 from ...runtime.links.peers import ClockOffset
 from ...runtime.loading import load_text
-from ...runtime.placement.placed import MachineLink, PlacedGraph, place
+from ...runtime.placement.placed import MachineLink, PlacedGraph, split_over_machines
 from ...runtime.running.memory import Memory
 from ...runtime.transports.transport import Transport, data_key
 from ...runtime.transports.zenoh_transport import ZenohTransport
@@ -75,7 +75,8 @@ RUN = b"benchmrk"
 
 
 def graph(ports: tuple[int, int]) -> PlacedGraph:
-    """Ten blocks on the first machine that the second reads, and one answer that the first reads."""
+    """Return ten blocks on the first machine that the second reads, and one answer that the first
+    reads."""
     there = "\n".join(
         f"  source{k}: {{use: blocks.Constant, with: {{value: {[float(k)] * NUMBERS}}}}}\n"
         f"  reader{k}: {{use: blocks.Gain, with: {{n: {NUMBERS}}}, in: {{u: source{k}.y}}, on: b}}"
@@ -88,7 +89,7 @@ blocks:
 {there}
   end: {{use: blocks.Gain, with: {{n: {NUMBERS}}}, in: {{u: reader0.y}}}}
 """
-    return place(load_text(text, Path("links.yaml")))
+    return split_over_machines(load_text(text, Path("links.yaml")))
 
 
 class _Known:
@@ -252,7 +253,7 @@ def _ten_links(placed: PlacedGraph, ticks: int, freeze: Callable[[], None]) -> l
 def _sending_times(
     senders: Sequence[tuple[MessageWriter, Callable[[bytes], None]]], ticks: int
 ) -> NDArray[np.float64]:
-    """Microseconds that each message took (ticks * links,), sent at ``RATE``."""
+    """Measure the microseconds that each message took (ticks * links,), sent at ``RATE``."""
     costs = np.zeros((ticks, len(senders)))
     deadline = time.perf_counter_ns()
     for tick in range(ticks):

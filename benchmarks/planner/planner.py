@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ...planner.checking.validity import InvalidPlanError, check_plan, why_not
+from ...planner.checking.validity import InvalidPlanError, check_plan, failure_text
 from ...planner.library.library import PlanLibrary, shipped_folder, solve_and_check
 from ...planner.problem.guess import ballistic_guess
 from ...planner.problem.problem import FullProblem
@@ -37,7 +37,7 @@ from ..rows import Row
 from .snopt import SnoptProgram, SnoptResult
 
 GOAL = 0.1
-"""s of processor time"""
+"""Processor time of a plan [s]."""
 CHANGES = {"rise": 0.01, "distance_x": 0.02, "distance_y": 0.02, "twist": math.radians(6.0)}
 """The most that each parameter changes by, where the task says it."""
 SEED = 1
@@ -65,8 +65,8 @@ def neighbours(seed: int = SEED) -> list[JumpTask]:
 
 
 def neighbour_rows(seed: int = SEED) -> list[Row]:
-    """Rows: CPU time of the search in the library, the solve and the check, each task planned for the second time
-    in this process; and how many have no valid plan."""
+    """Measure the CPU time of the search in the library, the solve and the check, each task planned
+    for the second time in this process; and how many have no valid plan."""
     robot = find_robot("bruce")
     rows, missed = [], list[str]()
     with tempfile.TemporaryDirectory() as folder:
@@ -82,7 +82,7 @@ def neighbour_rows(seed: int = SEED) -> list[Row]:
                 try:
                     plan = solve_and_check(task, robot, near[0] if near else None)
                 except (PlanError, InvalidPlanError) as error:
-                    failed = f"{task.name} ({why_not(error)})"
+                    failed = f"{task.name} ({failure_text(error)})"
                 else:
                     failed = ""
                 spent = cpu_time() - start
@@ -120,8 +120,8 @@ FLIGHT_GOAL = 1.0
 
 
 def reach_rows() -> list[Row]:
-    """Rows: CPU seconds from nothing to a checked plan of each task, none where there is no valid
-    plan; and the flight error of the shipped somersaults, by exact dynamics."""
+    """Measure the CPU seconds from nothing to a checked plan of each task, none where there is no
+    valid plan; and the flight error of the shipped somersaults, by exact dynamics."""
     robot = find_robot("bruce")
     rows = []
     for name, values in REACH.items():
@@ -146,12 +146,12 @@ def reach_rows() -> list[Row]:
 SNOPT = "SNOPT through Drake"
 SNOPT_GOAL = 1.0 / 30.0
 TIME_LIMIT = 120.0
-"""s of CPU that SNOPT is given for a task."""
+"""CPU time that SNOPT is given for a task [s]."""
 INSTALL = "Drake is not installed: pip install aloft-robotics[peers]"
 
 
 def solver_rows(tasks: dict[str, dict[str, Any]], rounds: int = 3) -> list[Row]:
-    """Rows of IPOPT and SNOPT for those tasks; ``ratio`` is fatrop's time by the other's."""
+    """Measure IPOPT and SNOPT on those tasks; ``ratio`` is fatrop's time by the other's."""
     rows = []
     for name, values in tasks.items():
         problem = _problem(name, values)

@@ -73,7 +73,7 @@ class _Callback:
         return sorted(found | set(zip(*(x.tolist() for x in self.next), strict=True)))
 
     def constraint(self, variables: Any) -> Any:
-        """Values, with derivatives where they are asked for."""
+        """Return values, with derivatives where they are requested."""
         from pydrake.autodiffutils import ExtractValue, InitializeAutoDiff
 
         started = self.owner.on_time()
@@ -95,7 +95,7 @@ class _Callback:
         return result
 
     def cost(self, variables: Any) -> Any:
-        """Return the piece's cost, with its gradient where it is asked for."""
+        """Return the piece's cost, with its gradient where it is requested."""
         from pydrake.autodiffutils import ExtractValue, InitializeAutoDiff
 
         started = self.owner.on_time()
@@ -192,7 +192,7 @@ class SnoptProgram:
         return now
 
     def solve(self, guess: Array, *, time_limit: float = 300.0) -> SnoptResult:
-        """SNOPT from the guess, with ``OPTIONS``, for at most so many CPU seconds.
+        """Run SNOPT from the guess, with ``OPTIONS``, for at most so many CPU seconds.
 
         Its own time limit is not obeyed through Drake, so a callback ends it.
         """

@@ -14,7 +14,7 @@ BARS = (
     ("OSQP block ", "whole-body program by OSQP"),
     ("old block ", "at an earlier commit"),
 )
-"""The bars from the top down: how the names of their rows begin, and what is written beside them."""
+"""The bars from the top down: the prefix of the names of their rows, and their labels."""
 SMALL = 0.04
 """Blocks that take less than this share of the first complete bar are one piece together."""
 

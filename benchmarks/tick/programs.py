@@ -47,7 +47,7 @@ class PeerProgram(FullProgram):
 
 
 def stacked(program: FullMatrices) -> tuple[Array, Array, Array]:
-    """Equalities and inequalities as lower <= matrix x <= upper."""
+    """Return equalities and inequalities as lower <= matrix x <= upper."""
     equality, inequality = program.equality, program.inequality
     matrix = np.vstack((equality.matrix, inequality.matrix))
     upper = np.hstack((equality.bound, inequality.bound))
@@ -280,7 +280,7 @@ def tsid_rows(
     tsid: RecordedController | None,
     check: TsidCheck | None,
 ) -> list[Row]:
-    """Beside TSID, which computes the terms of the dynamics by itself."""
+    """Measure beside TSID, which computes the terms of the dynamics by itself."""
     value = _sum_of(fused)
     if tsid is None or check is None:
         note = f"not installed; {INSTALL}; aloft bench tick --tsid FOLDER"
@@ -305,8 +305,8 @@ def tsid_rows(
 
 
 def earlier_rows(times: Times, before: Sequence[Mapping[str, float]], commit: str) -> list[Row]:
-    """Beside the controller of an earlier commit, which ran once for every round; its tick is the sum of
-    its blocks' medians, so without its scheduler and its recording."""
+    """Measure beside the controller of an earlier commit, which ran once for every round; its tick
+    is the sum of its blocks' medians, so without its scheduler and its recording."""
     if not before:
         return [Row("controller of an earlier commit", None, "us/tick", COMPILED,
                     note="not measured; aloft bench tick --since COMMIT, in a clone")]  # fmt: skip

@@ -363,7 +363,8 @@ def _tsid_controller(jump: RecordedJump, tsid: ModuleType) -> RecordedController
 
 
 def _hot(body: Callable[[], object]) -> float:
-    """Microseconds of a call that follows two others, as in a loop that does nothing else."""
+    """Measure the microseconds of a call that follows two others, as in a loop that does nothing
+    else."""
     body()
     body()
     start = time.perf_counter_ns()
@@ -384,7 +385,7 @@ def _missing(package: str) -> str:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """No garbage is collected within."""
+    """Keep Python from collecting garbage within."""
     gc.collect()
     gc.freeze()
     gc.disable()

@@ -53,7 +53,8 @@ INSTALL = (
 
 
 def import_tsid(folder: Path) -> ModuleType:
-    """TSID from a folder with its wheels; from then on Pinocchio is the one from there as well.
+    """Import TSID from a folder with its wheels; from then on Pinocchio is the one from there as
+    well.
 
     Raises:
         AloftError: TSID is not there, or another Pinocchio has been imported before.
@@ -343,7 +344,7 @@ class _Formulation:
         return self._add(task, weight, sample)
 
     def limit(self, bounds: Array) -> None:
-        """Bounds of the joints' torques."""
+        """Add bounds of the joints' torques."""
         task = self._tsid.TaskActuationBounds("bounds", self._robot)
         task.setBounds(-bounds, bounds)
         self.program.addActuationTask(task, 1.0, 0, 0.0)

@@ -34,7 +34,7 @@ class BalanceMemory(Signal):
     """The state of ``BalanceTarget``."""
 
     standing_height = Field(unit="m", text="planned height of the centre of mass in the first tick")
-    started = Field(dtype="bool", text="whether that height is known")
+    started = Field(dtype="bool", text="that height is known")
     trim = Field(3, unit="rad", frame="body", text="rotation added to the level target")
     origin = Field(3, unit="m", frame="world", text="position of the plan's origin")
     heading = Field(unit="rad", frame="world", text="heading of the plan's x axis")
@@ -42,7 +42,7 @@ class BalanceMemory(Signal):
 
 
 class HeadingSource(IntEnum):
-    """What the robot's heading is measured by."""
+    """The source of the robot's heading."""
 
     FEET = 0
     """The feet's own directions."""
@@ -53,16 +53,16 @@ class HeadingSource(IntEnum):
 
 
 class BalanceConstants(Signal):
-    """What the robot's description says."""
+    """Constants of the robot's description."""
 
-    heading_source = Field(dtype="int64", values=HeadingSource, text="what tells the heading")
-    counted = Field("n_feet", dtype="bool", text="whether each foot counts in the heading")
+    heading_source = Field(dtype="int64", values=HeadingSource, text="source of the heading")
+    counted = Field("n_feet", dtype="bool", text="each foot counts in the heading")
     nominal_mass = Field(unit="kg", text="mass by the description")
     foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
 
 
 class BalanceScratch(Signal):
-    """Room for a step of ``BalanceTarget``."""
+    """Scratch memory of one step of ``BalanceTarget``."""
 
     turn = Field(4, text="quaternion of a heading")
     quaternion = Field(4, text="a quaternion")
@@ -110,7 +110,7 @@ class BalanceParameters(Parameters):
         0.03, unit="m", ge=0.0, le=0.2, text="largest change of a jump's length"
     )
     place_time: float = live_parameter(
-        0.2, unit="s", gt=0.0, le=1.0, text="how long before lift-off it begins"
+        0.2, unit="s", gt=0.0, le=1.0, text="time from its begin to lift-off"
     )
 
 
@@ -168,7 +168,7 @@ class BalanceTarget(Block):
     reference = Input(JumpReference, text="the plan")
     phase = Input(PhaseState, text="the phase the robot is in")
     terms = Input(DynamicsTerms, text="the present state")
-    target = Output(WholeBodyTarget, text="what to achieve now")
+    target = Output(WholeBodyTarget, text="present target")
     memory = State(BalanceMemory, text="standing height and trim")
 
     def setup(self) -> None:
@@ -246,7 +246,7 @@ def choose_feet(
 
 @kernel
 def planned_heading(reference: JumpReference, counted: Flags1D) -> float:
-    """The mean of the planned headings [rad] of the feet that count."""
+    """Return the mean of the planned headings [rad] of the feet that count."""
     count, planned = 0, 0.0
     for foot in range(counted.shape[0]):
         count += 1 if counted[foot] else 0
@@ -265,8 +265,8 @@ def measured_heading(
     constants: BalanceConstants,
     scratch: BalanceScratch,
 ) -> float:
-    """The feet's heading [rad], by their own directions or by the pattern they stand in. The pattern of a single one
-    has none: then it is by how much the base is turned from the plan."""
+    """Measure the feet's heading [rad], by their own directions or by the pattern they stand in. The pattern of a
+    single one has none: then it is the angle by which the base is turned from the plan."""
     if constants.heading_source == HeadingSource.FEET:
         return mean_heading(terms.foot_rotation, scratch.counted)
     if constants.heading_source == HeadingSource.BASE:
@@ -285,7 +285,7 @@ def measured_heading(
 
 @kernel
 def set_heading(angle: float, quaternion: Array1D) -> None:
-    """The unit quaternion of a rotation about the vertical by ``angle`` [rad]."""
+    """Set the unit quaternion of a rotation about the vertical by ``angle`` [rad]."""
     quaternion[0], quaternion[1] = 0.0, 0.0
     quaternion[2], quaternion[3] = sincos(0.5 * angle)
 

@@ -33,11 +33,11 @@ class CircleTarget(Block):
         radius: float = live_parameter(0.05, unit="m", ge=0.0, text="radius of the circle")
         axis: Literal["x", "y", "z"] = parameter("x", text="the world's axis across the circle")
         turn_time: float = parameter(2.0, unit="s", gt=0.0, text="duration of a turn")
-        start: float = parameter(0.5, unit="s", ge=0.0, text="how long it rests in the centre")
-        growth: float = parameter(1.0, unit="s", gt=0.0, text="how long the radius grows")
+        start: float = parameter(0.5, unit="s", ge=0.0, text="time of rest in the centre")
+        growth: float = parameter(1.0, unit="s", gt=0.0, text="time in which the radius grows")
 
     params: Params
-    target = Output(PointTarget, text="where the point is, and how it moves")
+    target = Output(PointTarget, text="place and motion of the point")
 
     @classmethod
     def example_parameters(cls) -> dict[str, object]:

@@ -20,8 +20,8 @@ from ...mathematics.body_dynamics import (
     momentum_of,
     move_bodies,
     place_bodies,
-    place_of,
     point_jacobian,
+    point_position,
     velocity_at,
 )
 from ...mathematics.compiling.equations import cross
@@ -64,7 +64,7 @@ class DynamicsConstants(Signal):
 
 
 class DynamicsScratch(Signal):
-    """Room for a step of ``Dynamics``."""
+    """Scratch memory of one step of ``Dynamics``."""
 
     orientation = Field(4, text="unit quaternion of the base")
     offset = Field(3, text="of the torso's centre of mass, in least steps")
@@ -279,7 +279,7 @@ def write_matrices(
     tree: BodyTree, motion: BodyMotion, composite: Inertias, rotors: Array2D, scale: float,
     terms: DynamicsTerms,
 ) -> None:  # fmt: skip
-    """The mass matrix, with the inertia of the rotors, and the centroidal matrix.
+    """Write the mass matrix, with the inertia of the rotors, and the centroidal matrix.
 
     Args:
         rotors: the rotors' part of the mass matrix, in the joints' rows and columns.
@@ -353,7 +353,7 @@ def write_forces(
 
 @kernel
 def write_momentum(scale: float, mass: float, terms: DynamicsTerms) -> None:
-    """The momentum about the centre of mass, and its velocity, from the centroidal matrix.
+    """Write the momentum about the centre of mass, and its velocity, from the centroidal matrix.
 
     Args:
         scale, mass: the factor on all masses, and their sum without it [kg].
@@ -394,7 +394,7 @@ def equations_of_motion(
 
 @kernel
 def lowest_point(centre: Vector3, radius: float, rotation: Matrix3, out: Vector3) -> None:
-    """The lowest point (3,) of a ball, in the frame of the body it belongs to.
+    """Compute the lowest point (3,) of a ball, in the frame of the body it belongs to.
 
     Args:
         centre: of the ball [m, body].
@@ -408,7 +408,7 @@ def lowest_point(centre: Vector3, radius: float, rotation: Matrix3, out: Vector3
 def rolling_drift(
     motion: BodyMotion, body: int, centre: Vector3, lowest: Vector3, out: Vector3
 ) -> None:
-    """The rate of change (3,) of the velocity of a ball's lowest point, while v' = 0.
+    """Compute the rate of change (3,) of the velocity of a ball's lowest point, while v' = 0.
 
     The lowest point consists of other material at every instant. So its velocity
     v_c + w x (lowest - centre) has the derivative a_c + w' x (lowest - centre), without the
@@ -430,7 +430,7 @@ def write_contacts(
     constants: DynamicsConstants,
     scratch: DynamicsScratch,
 ) -> None:
-    """The contact points with their motion, Jacobians and drifts; the sole of a ball is its lowest point."""
+    """Write the contact points with their motion, Jacobians and drifts; the sole of a ball is its lowest point."""
     local, place, centre = scratch.point, scratch.place, scratch.centre
     scratch.sole[:, :] = constants.sole
     for point in range(constants.foot_of_point.shape[0]):
@@ -440,11 +440,11 @@ def write_contacts(
         if radius >= 0.0:
             lowest_point(constants.centre[point], radius, motion.rotation[body], local)
             scratch.sole[foot, :] = local
-        place_of(motion, body, local, place)
+        point_position(motion, body, local, place)
         velocity_at(motion, body, place, terms.contact_velocity[point])
         acceleration_at(motion, body, place, terms.contact_drift[point])
         if radius >= 0.0:
-            place_of(motion, body, constants.centre[point], centre)
+            point_position(motion, body, constants.centre[point], centre)
             rolling_drift(motion, body, centre, place, terms.contact_drift[point])
         point_jacobian(tree, motion, body, place, terms.contact_jacobian[point])
         terms.contact_position[point, :] = terms.base_position + place
@@ -457,9 +457,9 @@ def write_soles(
     constants: DynamicsConstants,
     scratch: DynamicsScratch,
 ) -> None:
-    """The places and rotations of the soles."""
+    """Write the places and rotations of the soles."""
     for foot in range(constants.foot_body.shape[0]):
         body = constants.foot_body[foot]
-        place_of(motion, body, scratch.sole[foot], scratch.place)
+        point_position(motion, body, scratch.sole[foot], scratch.place)
         terms.foot_position[foot, :] = terms.base_position + scratch.place
         terms.foot_rotation[foot, :, :] = motion.rotation[body]

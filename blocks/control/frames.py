@@ -14,8 +14,8 @@ from ...mathematics.body_dynamics import (
     body_motion,
     move_bodies,
     place_bodies,
-    place_of,
     point_jacobian,
+    point_position,
     rotation_jacobian,
     velocity_at,
 )
@@ -46,7 +46,7 @@ class Frame(NamedTuple):
 
 
 class FrameModel:
-    """The frames that tasks ask for. Where none is asked for, nothing is computed."""
+    """The frames that tasks use. Where none is used, nothing is computed."""
 
     def __init__(self, robot: RobotDescription, terms: DynamicsTerms, joints: JointState) -> None:
         self._robot, self._terms, self._joints = robot, terms, joints
@@ -56,7 +56,7 @@ class FrameModel:
         """What updates all frames in a tick, in this order."""
 
     def frame(self, name: str, offset: Vector = (0.0, 0.0, 0.0)) -> Frame:
-        """The frame called ``name``, moved by ``offset`` [m] in its own axes.
+        """Return the frame called ``name``, moved by ``offset`` [m] in its own axes.
 
         Raises:
             KeyError: the robot has no such frame.
@@ -81,7 +81,7 @@ class FrameModel:
 
 
 def frames_of(robot: RobotDescription) -> dict[str, tuple[str, Vector]]:
-    """The robot's frames by name, each with its link and its origin in the link's frame [m].
+    """Return the robot's frames by name, each with its link and its origin in the link's frame [m].
 
     They are the links, the named points and the contact points of the description; where two have
     one name the link counts, then the named point.
@@ -96,7 +96,7 @@ def frames_of(robot: RobotDescription) -> dict[str, tuple[str, Vector]]:
 def move_model(
     terms: DynamicsTerms, joints: JointState, tree: BodyTree, motion: BodyMotion
 ) -> None:
-    """The places, velocities and accelerations of all bodies, with constant generalised velocity."""
+    """Compute the places, velocities and accelerations of all bodies, with constant generalised velocity."""
     for row in range(3):
         linear, angular = 0.0, 0.0
         for column in range(3):
@@ -118,9 +118,9 @@ def update_frame(
     local: Array1D,
     frame: Frame,
 ) -> None:
-    """The motion and the Jacobian of the point ``local`` [m] of a body that ``move_model`` has moved."""
+    """Update the motion and the Jacobian of the point ``local`` [m] of a body that ``move_model`` has moved."""
     place = frame.position
-    place_of(motion, body, local, place)
+    point_position(motion, body, local, place)
     velocity_at(motion, body, place, frame.velocity[0:3])
     acceleration_at(motion, body, place, frame.drift[0:3])
     point_jacobian(tree, motion, body, place, frame.jacobian[0:3, :])

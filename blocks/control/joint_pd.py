@@ -95,21 +95,21 @@ class JointFollower(Signal):
     airborne = Field("n_feet", unit="", text="0: stance gains, 1: flight gains")
     position = Field("n_joints", unit="rad", text="integrated stance targets")
     velocity = Field("n_joints", unit="rad/s", text="their velocities")
-    started = Field(dtype="bool", text="whether the targets have begun at the measured joints")
+    started = Field(dtype="bool", text="the targets have begun at the measured joints")
 
 
 class JointPDConstants(Signal):
-    """What follows from the parameters and the robot."""
+    """Constants derived from the parameters and the robot."""
 
     foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
     foot_of_joint = Field(
         "n_joints", dtype="int64", text="the foot of each joint; -1: it is held, or in no leg"
     )
-    held = Field("n_joints", dtype="bool", text="whether each joint is held")
+    held = Field("n_joints", dtype="bool", text="each joint is held")
     held_angle = Field("n_joints", unit="rad", text="the angle at which it is held")
-    free = Field("n_joints", dtype="bool", text="whether it is neither held nor in a leg")
+    free = Field("n_joints", dtype="bool", text="it is neither held nor in a leg")
     standing = Field("n_joints", unit="rad", text="the standing pose")
-    planned = Field(dtype="bool", text="whether a plan is wired")
+    planned = Field(dtype="bool", text="a plan is wired")
     limits = Field(("n_joints", 2), unit="rad", text="the joints' limits")
     flight_stiffness = Field("n_joints", unit="N m/rad", text="gains in the air")
     flight_damping = Field("n_joints", unit="N m s/rad", text="gains in the air")
@@ -118,11 +118,11 @@ class JointPDConstants(Signal):
     blend_rate = Field(text="the largest change of a leg's weight in a tick")
     friction = Field("n_joints", unit="N m", text="friction to compensate")
     viscous_friction = Field("n_joints", unit="N m s/rad", text="damping to compensate")
-    compensates = Field(dtype="bool", text="whether there is any of the two")
+    compensates = Field(dtype="bool", text="there is any of the two")
 
 
 class JointPDScratch(Signal):
-    """Room for a step of ``JointPD``."""
+    """Scratch memory of one step of ``JointPD``."""
 
     airborne = Field("n_joints", text="weight of the flight gains of each joint")
     flight_position = Field("n_joints", unit="rad", text="targets of the flight gains")
@@ -154,7 +154,7 @@ class JointPD(Block):
     towards the planned angles, or towards the standing pose if no plan is wired.
 
     **Stance gains** are zero by default, so that the feedforward alone carries the robot. Otherwise
-    ``stance_targets`` says what their targets are. With ``measured`` they are the measured angles
+    ``stance_targets`` chooses their targets. With ``measured`` they are the measured angles
     and zero velocity, so that only the damping acts. With ``acceleration`` they are the whole-body
     controller's accelerations, integrated twice, with a leak towards the measured joints of the
     time constant ``leak``. With ``legs``, as in the paper, they are the inverse kinematics of the
@@ -185,7 +185,7 @@ class JointPD(Block):
     phase = Input(PhaseState, text="the phase and which points may push")
     joints = Input(JointState, text="measured joints")
     reference = Input(JumpReference, default={}, text="the planned joints, if they are known")
-    command = Output(JointCommand, text="what the drives execute")
+    command = Output(JointCommand, text="command to the drives")
     follower = State(JointFollower, text="blending and stance targets")
 
     def setup(self) -> None:
@@ -381,7 +381,8 @@ def find_stance_targets(
     constants: JointPDConstants,
     scratch: JointPDScratch,
 ) -> None:
-    """The measured joints at rest, the legs' targets, or integrated accelerations; held joints have the plan's."""
+    """Find the stance targets: the measured joints at rest, the legs' targets, or integrated accelerations; held joints
+    have the plan's."""
     position, velocity = scratch.stance_position, scratch.stance_velocity
     for i in range(constants.held.shape[0]):
         if constants.held[i] and constants.planned:
@@ -404,8 +405,8 @@ def find_flight_targets(
     constants: JointPDConstants,
     scratch: JointPDScratch,
 ) -> None:
-    """The legs' targets, and for held joints, those of no leg, or all joints of a robot that hangs the plan;
-    without a plan the held angles and the standing pose."""
+    """Find the flight targets: the legs' targets, and for held joints, those of no leg, or all joints of a robot that
+    hangs the plan; without a plan the held angles and the standing pose."""
     position, velocity = scratch.flight_position, scratch.flight_velocity
     for i in range(constants.held.shape[0]):
         if constants.held[i] and not constants.planned:
@@ -488,7 +489,7 @@ def default_gains(robot: RobotDescription) -> tuple[Array, Array]:
 
 
 def _joint_inertia(robot: RobotDescription) -> Array:
-    """The inertia of every joint in the standing pose [kg m^2], (n_joints,)."""
+    """Return the inertia of every joint in the standing pose [kg m^2], (n_joints,)."""
     import pinocchio
 
     built = build_pinocchio_model(robot)

@@ -73,27 +73,25 @@ class LegParams(Parameters):
     )  # fmt: skip
     plan_lead: float = live_parameter(
         0.0, unit="s", ge=0.0, le=0.03,
-        text="by how much the joints are ahead of the plan's that they follow, from the middle of "
-        "the flight on",
+        text="lead of the joints over the plan's that they follow, from the middle of the flight on",
     )  # fmt: skip
     level_time: float = live_parameter(
         0.0, unit="s", ge=0.0, le=0.2,
-        text="how long before touchdown the soles of a plan that is followed begin to become "
-        "level; never with 0",
+        text="time before touchdown at which the soles of a plan that is followed begin to become level; never with 0",
     )  # fmt: skip
     late_time: float = live_parameter(
         0.0, unit="s", ge=0.0, le=0.03,
-        text="how long after the planned touchdown legs that follow a plan go on as in its flight",
+        text="time after the planned touchdown for which legs that follow a plan go on as in its flight",
     )  # fmt: skip
     beyond: Literal["turn", "slide"] = live_parameter(
-        "turn", text="where errors are allowed first for a target out of reach"
+        "turn", text="place of the errors that are allowed first for a target out of reach"
     )
 
 
 class LegConstants(Signal):
     """Held joints, and for each foot the joint that levels its sole."""
 
-    held = Field("n_joints", dtype="bool", text="whether the description holds the joint")
+    held = Field("n_joints", dtype="bool", text="the description holds the joint")
     held_position = Field("n_joints", unit="rad", text="the position at which it is held")
     sole_joint = Field("n_feet", dtype="int64", text="the last joint about the lateral axis")
     sole_axis = Field("n_feet", unit="", text="the sign of its axis along y; 0: no such joint")
@@ -102,16 +100,16 @@ class LegConstants(Signal):
 
 
 class LegKinematicsScratch(Signal):
-    """Room for a step of ``LegInverseKinematics``."""
+    """Scratch memory of one step of ``LegInverseKinematics``."""
 
-    slides = Field(dtype="bool", text="whether a foot out of reach slides in its sole's plane")
+    slides = Field(dtype="bool", text="a foot out of reach slides in its sole's plane")
 
 
 class LegInverseKinematics(KernelBlock):
     """Joint positions and velocities for foot targets relative to the base (paper, V).
 
     A leg is the chain of joints from the base to a foot, of any number and kind. The kind of foot
-    says how much of the target's orientation counts: all of it for a flat foot, the direction of
+    decides how much of the target's orientation counts: all of it for a flat foot, the direction of
     the contact line for a line foot, and none for a point foot, whose lowest point goes to the
     target's position.
 
@@ -122,7 +120,7 @@ class LegInverseKinematics(KernelBlock):
     the target, also from the measured and from the standing joints. Within reach both methods agree
     to 1e-9 rad, and 59 of 60 jumps land with either (18 cm up, 38 cm ahead, 20 cm aside; 20 seeds each).
     The closed form stays for its time: of both legs out of reach 6.4 us in place of 86 us, and within
-    reach 6.0 us in place of 7.6 us. ``reachable`` says whether the foot reaches its target.
+    reach 6.0 us in place of 7.6 us. ``reachable`` is true where the foot reaches its target.
 
     For a target out of reach the solution is the nearest pose within reach. With ``beyond: slide``
     errors in the plane of the sole are allowed first, so the foot keeps its height above the ground
@@ -148,7 +146,7 @@ class LegInverseKinematics(KernelBlock):
 
     The plan can be followed in two other ways, both off by default. The joints are ahead of the plan by
     ``plan_lead``, which makes up for what drives lag behind, and grows until the middle of the flight. A
-    robot never turns exactly as planned: let e be by how much the base has turned further about its
+    robot never turns exactly as planned: let e be the angle that the base has turned further about its
     lateral axis, from the targets of feet whose soles are level in the world (``landing.alpha`` 1). From
     ``level_time`` before touchdown on the last joint of each leg about the lateral axis turns the sole by
     -e, so that heel and toe touch down together. It reaches that in half of the time.
@@ -175,7 +173,7 @@ class LegInverseKinematics(KernelBlock):
     constants: LegConstants
     scratch: LegKinematicsScratch
 
-    feet = Input(FootTarget, text="where the feet should be, relative to the base")
+    feet = Input(FootTarget, text="targets of the feet, relative to the base")
     joints = Input(JointState, text="measured joints, where the least squares begin")
     reference = Input(
         JumpReference, default={},
@@ -233,7 +231,7 @@ class LegInverseKinematics(KernelBlock):
             constants.sole_highest[foot] = highest - margin
 
     def _closed_form(self, foot: int, leg: Leg) -> tuple[KernelCall, KernelCall]:
-        """The calls for a five-joint leg."""
+        """Return the calls for a five-joint leg."""
         scratch, pitched = leg_scratch(), self.params.follow == "pitch"
         watch = signal_call(
             watch_line, foot, self.feet, self.reference, pitched, self.period, self.memory, scratch
@@ -245,7 +243,7 @@ class LegInverseKinematics(KernelBlock):
         return watch, follow
 
     def _least_squares(self, foot: int) -> tuple[KernelCall, KernelCall]:
-        """The calls for a leg of any number of joints."""
+        """Return the calls for a leg of any number of joints."""
         limb = limb_geometry(self.robot, foot, self.params.margin)
         scratch, pitched = limb_memory(len(limb.joints)), self.params.follow == "pitch"
         watch = signal_call(
@@ -360,7 +358,7 @@ def extrapolate(
 
 @kernel
 def keeps_acceleration(reference: JumpReference, params: LegParams, memory: LegMemory) -> bool:
-    """Whether the last accelerations stay, because the plan's may be the landing's already.
+    """Check whether the last accelerations stay, because the plan's may be the landing's already.
 
     A ``touchdown_time`` that has long passed is that of the flight before.
     """
@@ -371,7 +369,7 @@ def keeps_acceleration(reference: JumpReference, params: LegParams, memory: LegM
 
 @kernel
 def lead_share(reference: JumpReference) -> float:
-    """The share of the lead that counts: it grows from 0 at lift-off to 1 in the middle of the flight.
+    """Return the share of the lead that counts: it grows from 0 at lift-off to 1 in the middle of the flight.
 
     From its middle on the plan may name the times of the next flight already.
     """
@@ -384,7 +382,7 @@ def lead_share(reference: JumpReference) -> float:
 
 @kernel
 def excess_pitch(level: Matrix3, pitch: float) -> float:
-    """By how much [rad] the base has turned further about its y axis than the plan's ``pitch`` [rad].
+    """Return the angle [rad] that the base has turned further about its y axis than the plan's ``pitch`` [rad].
 
     Args:
         level: the rotation of a level sole in the base's axes.

@@ -59,10 +59,10 @@ class LegMemory(Signal):
     """The feet's targets and the joints' solution of the last tick."""
 
     direction = Field(("n_feet", 3), unit="", frame="body", text="heel to toe, of unit length")
-    known = Field(dtype="bool", text="whether there was a last tick")
+    known = Field(dtype="bool", text="there was a last tick")
     target = Field(("n_feet", 4, 3), frame="body", text="place [m] and rows of the rotation matrix")
     position = Field("n_joints", unit="rad", text="joint positions found")
-    flew = Field(dtype="bool", text="whether the plan has flown and was followed")
+    flew = Field(dtype="bool", text="the plan has flown and was followed")
     flown_time = Field(unit="s", text="the plan's time in the last tick of its flight")
     flown_position = Field("n_joints", unit="rad", text="the joints' targets then")
     flown_velocity = Field("n_joints", unit="rad/s", text="their velocities")
@@ -73,8 +73,8 @@ class LegSettings(NamedTuple):
     """Settings that may change during a run, each an array without a dimension.
 
     ``softness`` [m], ``turn_length`` [m] and ``damping`` [m] are those of ``inverse`` and
-    ``inverse_velocity``; ``level`` says where the hip's yaw is kept; ``speed_limit`` [rad/s] limits
-    the joints' velocities; ``slides`` says whether a foot out of reach slides in the plane of its
+    ``inverse_velocity``; ``level`` is the place where the hip's yaw is kept; ``speed_limit`` [rad/s] limits
+    the joints' velocities; ``slides`` is true if a foot out of reach slides in the plane of its
     sole first.
     """
 
@@ -105,7 +105,7 @@ class LegScratch(NamedTuple):
 
 
 def with_margin(leg: Leg, margin: float) -> Leg:
-    """A leg whose joints stay ``margin`` [rad] inside their limits."""
+    """Return a leg whose joints stay ``margin`` [rad] inside their limits."""
     return leg._replace(limits=leg.limits + np.array([margin, -margin]))
 
 
@@ -125,7 +125,7 @@ def watch_line(
     memory: LegMemory,
     scratch: LegScratch,
 ) -> None:
-    """The desired direction of a foot's line, and how fast it turns.
+    """Track the desired direction of a foot's line, and its rate.
 
     Args:
         number: the foot's.
@@ -149,7 +149,7 @@ def follow_foot(
     scratch: LegScratch,
     target: JointTarget,
 ) -> None:
-    """The angles and velocities of a leg's joints for its foot's target (paper, V).
+    """Compute the angles and velocities of a leg's joints for its foot's target (paper, V).
 
     Args:
         number: the foot's.
@@ -225,7 +225,7 @@ class LimbScratch(NamedTuple):
 
 
 def limb_geometry(robot: RobotDescription, foot: int, margin: float) -> LimbGeometry:
-    """The limb that ends in foot number ``foot``; its joints stay ``margin`` inside their limits.
+    """Return the limb that ends in foot number ``foot``; its joints stay ``margin`` inside their limits.
 
     Raises:
         ValueError: no chain of joints leads from the base to the foot.
@@ -261,7 +261,7 @@ def watch_foot(
     memory: LegMemory,
     scratch: LimbScratch,
 ) -> None:
-    """The target of the limb, and how fast it turns.
+    """Track the target of the limb, and its rate.
 
     Args:
         number: the foot's.
@@ -295,7 +295,7 @@ def follow_limb(
     scratch: LimbScratch,
     target: JointTarget,
 ) -> None:
-    """The positions and velocities of a limb's joints for its foot's target, by least squares.
+    """Compute the positions and velocities of a limb's joints for its foot's target, by least squares.
 
     Args:
         number: the foot's.

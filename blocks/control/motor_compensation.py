@@ -9,14 +9,14 @@ from ..signals import JointCommand, MotorCondition
 
 
 class CompensationConstants(Signal):
-    """What follows from the robot's description."""
+    """Constants derived from the robot's description."""
 
     torque_to_motor = Field(("n_joints", "n_joints"), text="joint torques to those of motors")
     torque_to_joint = Field(("n_joints", "n_joints"), text="torques of motors to those of joints")
 
 
 class CompensationScratch(Signal):
-    """Room for a step of ``MotorCompensation``."""
+    """Scratch memory of one step of ``MotorCompensation``."""
 
     torque = Field("n_joints", unit="N m", text="of the motors")
 
@@ -24,8 +24,8 @@ class CompensationScratch(Signal):
 class MotorCompensation(Block):
     """The command whose feedforward torques are by the nominal torque constants, as drives take them.
 
-    A motor with the share c of its nominal torque constant gives c times the torque that its drive is asked for, so
-    for the torque t it is asked for t / c. ``MotorDrift`` finds c. Through the transmission A: with
+    A motor with the share c of its nominal torque constant gives c times the torque that is commanded of its drive, so
+    for the torque t the command is t / c. ``MotorDrift`` finds c. Through the transmission A: with
     kappa = A^-T tau of the motors, tau' = A^T (kappa / c). Targets and gains pass as they are: a feedback that
     is some per cent weaker needs no correction.
     """
@@ -36,7 +36,7 @@ class MotorCompensation(Block):
     constants: CompensationConstants
 
     desired = Input(JointCommand, text="the command, with the torques that joints are to get")
-    motors = Input(MotorCondition, text="what the motors are like now")
+    motors = Input(MotorCondition, text="present condition of the motors")
     command = Output(JointCommand, text="the same, with the torques to ask for")
 
     def setup(self) -> None:

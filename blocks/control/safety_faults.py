@@ -1,4 +1,4 @@
-"""What ``SafetyMonitor`` finds wrong, and how it says so."""
+"""The faults that ``SafetyMonitor`` finds, and their texts."""
 
 from __future__ import annotations
 
@@ -69,9 +69,9 @@ SWITCH_TEXTS = {
     SwitchFault.STUCK_OPEN: "is stuck: it was open under a foot that stood",
     SwitchFault.BOUNCING: "bounces: it opened and closed too often",
 }
-"""What is wrong with a foot switch, in words."""
+"""The faults of a foot switch, in words."""
 
 
 def is_of_hardware(fault: SafetyFault) -> bool:
-    """Whether the robot's hardware reported the fault, so that the run must end."""
+    """Check whether the robot's hardware reported the fault, so that the run must end."""
     return fault >= SafetyFault.DRIVE

@@ -82,7 +82,7 @@ class SafetyMonitor(Block):
     desired = Input(JointCommand, text="the controller's command")
     base = Input(BaseState, text="the estimated base")
     joints = Input(JointState, text="the measured joints")
-    wbc = Input(WholeBodyCommand, text="whether the controller has solved")
+    wbc = Input(WholeBodyCommand, text="success of the controller's solution")
     imu = Input(ImuReading, default={}, text="the IMU's readings; not judged where it is not wired")
     health = Input(
         RobotHealth,
@@ -90,10 +90,10 @@ class SafetyMonitor(Block):
             "state": int(DrivePhase.DRIVING), "condition": HEALTHY, "stamp": UNSTAMPED,
             "joints_valid": True, "imu_valid": True, "contacts_valid": True,
         },
-        text="how drives and sensors are; not judged where it is not wired",
+        text="condition of drives and sensors; not judged where it is not wired",
     )  # fmt: skip
-    switches = Input(SwitchHealth, default={}, text="which foot switches are at fault")
-    command = Output(JointCommand, text="what the drives get")
+    switches = Input(SwitchHealth, default={}, text="faults of the foot switches")
+    command = Output(JointCommand, text="command to the drives")
     state = State(SafetyState, text="timers and the fault")
 
     def prepare(self) -> None:
@@ -191,7 +191,7 @@ class SafetyMonitor(Block):
         return result
 
     def _reason(self, fault: SafetyFault) -> str:
-        """A fault in words."""
+        """Describe a fault in words."""
         if not is_of_hardware(fault):
             return TEXTS[fault]
         if fault == SafetyFault.SWITCH:
@@ -203,7 +203,7 @@ class SafetyMonitor(Block):
         return health_text(fault, motor, float(self.state.fault_value), self.params)
 
     def _reading_reason(self, fault: SafetyFault) -> str:
-        """A fault of readings in words, with its limit."""
+        """Describe a fault of readings in words, with its limit."""
         place, limit = int(self.state.fault_place), self.params
         if fault == SafetyFault.STUCK_IMU:
             sensor = f"{('gyroscope', 'accelerometer')[place // 3]}, axis {'xyz'[place % 3]},"
@@ -230,7 +230,7 @@ def judge_motion(
     params: SafetyParams,
     constants: SafetyConstants,
 ) -> int:
-    """The gravest fault of this tick in motion and computation; updates their timers."""
+    """Find the gravest fault of this tick in motion and computation; updates their timers."""
     if not is_plausible(desired, constants.torque):
         return SafetyFault.ABSURD_COMMAND
     if not is_possible(base, joints):
@@ -251,7 +251,7 @@ def judge_motion(
 
 @kernel
 def is_plausible(command: JointCommand, torque: Array1D) -> bool:
-    """Whether a command is finite and within what drives can do, its torques within ``torque``."""
+    """Check whether a command is finite and within what drives can do, its torques within ``torque``."""
     for joint in range(torque.shape[0]):
         if not abs(command.torque[joint]) <= torque[joint]:
             return False
@@ -265,7 +265,7 @@ def is_plausible(command: JointCommand, torque: Array1D) -> bool:
 
 @kernel
 def is_possible(base: BaseState, joints: JointState) -> bool:
-    """Whether a state is finite and within what a robot can do."""
+    """Check whether a state is finite and within what a robot can do."""
     return (
         within(joints.position, 100.0)
         and within(joints.velocity, 1000.0)
@@ -278,7 +278,7 @@ def is_possible(base: BaseState, joints: JointState) -> bool:
 
 @kernel
 def within(values: Array1D, limit: float) -> bool:
-    """Whether all values are finite and their magnitudes at most ``limit``."""
+    """Check whether all values are finite and their magnitudes at most ``limit``."""
     inside = True
     for i in range(values.shape[0]):
         inside = inside and abs(values[i]) <= limit
@@ -337,7 +337,7 @@ def compare_torques(
 
 @kernel
 def judge_readings(state: SafetyState, constants: SafetyConstants) -> tuple[int, int]:
-    """The first reading that is stuck, or torque that is off, and its joint or axis."""
+    """Find the first reading that is stuck, or torque that is off, and its joint or axis."""
     if constants.stuck_ticks > 0:
         for k in range(state.stuck_joints.shape[0]):
             if state.stuck_joints[k] >= constants.stuck_ticks:
@@ -362,7 +362,7 @@ def judge_health(
     params: SafetyParams,
     constants: SafetyConstants,
 ) -> tuple[int, int]:
-    """The gravest fault of the hardware, and the drive that has it; updates all counts."""
+    """Find the gravest fault of the hardware, and the drive that has it; updates all counts."""
     fault, place = 0, 0
     lowest = constants.lowest_voltage
     if params.pack_resistance > 0.0:
@@ -395,8 +395,8 @@ def sag_under_load(
     params: SafetyParams,
     constants: SafetyConstants,
 ) -> float:
-    """By how much [V] the pack's voltage is below that without load, from the work of the motors and
-    the heat of their windings."""
+    """Return the drop [V] of the pack's voltage below that without load, from the work of the motors and the heat of
+    their windings."""
     count = health.voltage.shape[0]
     power, total = 0.0, 0.0
     for k in range(count):
@@ -418,8 +418,8 @@ def judge_drive(
     lowest: float,
     k: int,
 ) -> int:
-    """The gravest fault of drive ``k``, whose voltage may be as low as ``lowest`` [V]; updates its counts.
-    A voltage of zero was not measured."""
+    """Find the gravest fault of drive ``k``, whose voltage may be as low as ``lowest`` [V]; updates its counts. A
+    voltage of zero was not measured."""
     condition, voltage = health.condition[k], health.voltage[k]
     low = 0.0 < voltage < lowest
     hot = not health.temperature[k] <= params.highest_temperature
@@ -444,7 +444,7 @@ def judge_drive(
 def judge_sensors(
     health: RobotHealth, state: SafetyState, params: SafetyParams, constants: SafetyConstants
 ) -> int:
-    """The gravest fault of the sensors; updates all counts."""
+    """Find the gravest fault of the sensors; updates all counts."""
     invalid, stamps, stamp = state.invalid, state.stamps, health.stamp
     invalid[0] = 0 if health.joints_valid else invalid[0] + 1
     invalid[1] = 0 if health.imu_valid else invalid[1] + 1
@@ -464,7 +464,7 @@ def judge_sensors(
 
 @kernel
 def measured_value(health: RobotHealth, fault: int, place: int) -> float:
-    """The measured value of a fault, in the unit of its signal."""
+    """Return the measured value of a fault, in the unit of its signal."""
     if fault == SafetyFault.DRIVE:
         return float(health.condition[place])
     if fault == SafetyFault.SILENT_DRIVE:
@@ -482,7 +482,7 @@ def measured_value(health: RobotHealth, fault: int, place: int) -> float:
 
 @kernel
 def first_bad_switch(switches: SwitchHealth) -> int:
-    """The first foot switch that is at fault; the last one if none is."""
+    """Find the first foot switch that is at fault; the last one if none is."""
     place, fault = 0, switches.fault
     while place < fault.shape[0] - 1 and (fault[place] == 0 or fault[place] == SwitchFault.HEAVY):
         place += 1
@@ -520,7 +520,7 @@ def damp(position: Array1D, damping: Array1D, command: JointCommand) -> None:
 
 
 def health_text(fault: SafetyFault, motor: str, value: float, params: SafetyParams) -> str:
-    """A fault of the hardware in words, with its limit and the measured value.
+    """Describe a fault of the hardware in words, with its limit and the measured value.
 
     Args:
         motor: the motor of the drive that is at fault.

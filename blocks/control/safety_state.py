@@ -1,4 +1,4 @@
-"""What ``SafetyMonitor`` is told, remembers, and computes beforehand."""
+"""The parameters, memory and constants of ``SafetyMonitor``."""
 
 from __future__ import annotations
 
@@ -14,15 +14,17 @@ class SafetyParams(Parameters):
     """The parameters of ``SafetyMonitor``."""
 
     tilt_limit: float = parameter(1.2, unit="rad", gt=0.0, le=math.pi, text="largest lean")
-    tilt_hold: float = parameter(0.02, unit="s", ge=0.0, text="how long the base may lean further")
+    tilt_hold: float = parameter(
+        0.02, unit="s", ge=0.0, text="time for which the base may lean further"
+    )
     limit_margin: float = parameter(
-        0.05, unit="rad", ge=0.0, text="how far a joint may be beyond its limits"
+        0.05, unit="rad", ge=0.0, text="distance by which a joint may be beyond its limits"
     )
     speed_limit: PerJoint | None = parameter(
         None, unit="rad/s", gt=0.0, text="largest joint speed; none: twice what its motors reach"
     )
     joint_hold: float = parameter(
-        0.02, unit="s", ge=0.0, text="for how long a joint may be further or faster"
+        0.02, unit="s", ge=0.0, text="time for which a joint may be further or faster"
     )
     torque_limit: PerJoint | None = parameter(
         None, unit="N m", gt=0.0,
@@ -30,7 +32,7 @@ class SafetyParams(Parameters):
     )  # fmt: skip
     stuck_time: float = parameter(
         0.05, unit="s", ge=0.0,
-        text="how long a joint or an axis of the IMU may read the very same; zero: not judged",
+        text="time for which a joint or an axis of the IMU may read the very same; zero: not judged",
     )  # fmt: skip
     torque_error: float = parameter(
         0.8, unit="", ge=0.0,
@@ -38,7 +40,7 @@ class SafetyParams(Parameters):
     )  # fmt: skip
     unsolved_ticks: int = parameter(25, ge=0, text="ticks in a row without a solution")
     torque_hold: float = parameter(
-        0.1, unit="s", ge=0.0, text="how long a joint's torque may be off its command"
+        0.1, unit="s", ge=0.0, text="time for which a joint's torque may be off its command"
     )
     damping: PerJoint | None = live_parameter(
         None, unit="N m s/rad", ge=0.0,
@@ -65,7 +67,7 @@ class SafetyParams(Parameters):
         None, unit="A", gt=0.0, text="largest measured current of a drive; none: not judged"
     )
     health_hold: float = parameter(
-        0.02, unit="s", ge=0.0, text="how long voltage, temperature or current may be beyond"
+        0.02, unit="s", ge=0.0, text="time for which voltage, temperature or current may be beyond"
     )
     answer_age: float = parameter(
         0.02, unit="s", gt=0.0, text="oldest answer of a drive that may be used"
@@ -75,10 +77,10 @@ class SafetyParams(Parameters):
     )
     invalid_hold: float = parameter(
         0.1, unit="s", ge=0.0,
-        text="how long joints, IMU or switches may be marked as not valid",
+        text="time for which joints, IMU or switches may be marked as not valid",
     )  # fmt: skip
     stamp_age: float = parameter(
-        0.05, unit="s", gt=0.0, text="how long the robot's time stamp may stay the same"
+        0.05, unit="s", gt=0.0, text="time for which the robot's time stamp may stay the same"
     )
 
 
@@ -86,7 +88,9 @@ class SafetyState(Signal):
     """The state of ``SafetyMonitor``."""
 
     fault = Field(
-        dtype="int64", values=SafetyFault, text="why the robot is damped; the first reason stays"
+        dtype="int64",
+        values=SafetyFault,
+        text="reason why the robot is damped; the first one stays",
     )
     fault_tick = Field(dtype="int64", text="when")
     tilted = Field(dtype="int64", text="ticks in a row the base has leant too far")
@@ -98,10 +102,10 @@ class SafetyState(Signal):
     expected = Field("n_joints", unit="N m", text="torques that the last command asks for")
     asked = Field("n_joints", unit="N m", text="their magnitudes, smoothed")
     missing = Field(
-        "n_joints", unit="N m", text="measured torques less what was asked for, smoothed"
+        "n_joints", unit="N m", text="measured torques less the commanded ones, smoothed"
     )
     off = Field("n_joints", dtype="int64", text="ticks in a row each torque was off its command")
-    measures = Field(dtype="bool", text="whether the robot measures torques")
+    measures = Field(dtype="bool", text="the robot measures torques")
     unsolved = Field(dtype="int64", text="ticks in a row without a solution")
     last_position = Field("n_joints", unit="rad", text="joint angles of the last tick")
     last_velocity = Field("n_joints", unit="rad/s", text="joint velocities of the last tick")
@@ -113,7 +117,7 @@ class SafetyState(Signal):
     motor_torque = Field("n_joints", unit="N m", text="measured torques of the motors")
     heat = Field("n_joints", unit="J", text="the windings' heat so far")
     fault_place = Field(dtype="int64", text="index of the motor or switch that was at fault")
-    fault_value = Field(text="what it measured, in the unit of its signal")
+    fault_value = Field(text="measured value, in the unit of its signal")
 
 
 class SafetyConstants(Signal):
@@ -125,16 +129,16 @@ class SafetyConstants(Signal):
     torque = Field("n_joints", unit="N m", text="greatest torques of a command")
     peak = Field("n_joints", unit="N m", text="the motors' peak torques at the joints")
     fading = Field(text="share of a smoothed torque that goes in a tick")
-    imu_wired = Field(dtype="bool", text="whether there are readings of an IMU")
-    torque_ticks = Field(dtype="int64", text="how many ticks a torque may be off its command")
-    stuck_ticks = Field(dtype="int64", text="how many ticks a reading may stay; zero: not judged")
+    imu_wired = Field(dtype="bool", text="there are readings of an IMU")
+    torque_ticks = Field(dtype="int64", text="ticks for which a torque may be off its command")
+    stuck_ticks = Field(dtype="int64", text="ticks for which a reading may stay; zero: not judged")
     damping = Field("n_joints", unit="N m s/rad", text="joint damping after a fault")
     lowest_voltage = Field(unit="V", text="zero: not judged")
     torque_to_motor = Field(("n_joints", "n_joints"), text="joint torques to those of the motors")
     largest_current = Field(unit="A", text="infinite: not judged")
     heating = Field(text="heat of a winding in a tick for its squared torque [J/(N m)^2]")
-    tilt_ticks = Field(dtype="int64", text="how many ticks the base may lean too far")
-    joint_ticks = Field(dtype="int64", text="how many a joint may be beyond its limits")
-    health_ticks = Field(dtype="int64", text="how many a drive may be beyond a limit")
-    invalid_ticks = Field(dtype="int64", text="how many readings may be marked as not valid")
-    stamp_ticks = Field(dtype="int64", text="how many the time stamp may stay the same")
+    tilt_ticks = Field(dtype="int64", text="ticks for which the base may lean too far")
+    joint_ticks = Field(dtype="int64", text="ticks for which a joint may be beyond its limits")
+    health_ticks = Field(dtype="int64", text="ticks for which a drive may be beyond a limit")
+    invalid_ticks = Field(dtype="int64", text="ticks for which readings may be marked as not valid")
+    stamp_ticks = Field(dtype="int64", text="ticks for which the time stamp may stay the same")

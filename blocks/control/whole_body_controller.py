@@ -103,7 +103,7 @@ class WholeBodyController(KernelBlock):
     paper, sets no limits. ``joint`` bounds each joint's torque by the peak torque of the motor with
     the same index. ``motor`` bounds the torque of every motor, through the transmission, by its
     torque-speed curve at its present speed, which is exact also for differential joints; with
-    ``follow_motors`` by the shares of torque and speeds that the input ``motors`` says are left of them.
+    ``follow_motors`` by the shares of torque and speeds that are left of them by the input ``motors``.
 
     **Solution.** Accelerations are eliminated exactly (``mathematics/whole_body_reduction``), and ``solver``
     finds the contact forces. ``active_set`` is a dual active-set method that starts cold, so the
@@ -152,7 +152,7 @@ class WholeBodyController(KernelBlock):
         )  # fmt: skip
         follow_motors: bool = parameter(
             False,
-            text="whether the limits follow how motors and pack are now, by an input `motors`",
+            text="the limits follow the present condition of motors and pack, by an input `motors`",
         )
         friction: float = live_parameter(0.5, gt=0.0, le=2.0, text="mu_c of the friction cones")
         force_min: float = live_parameter(
@@ -199,7 +199,7 @@ class WholeBodyController(KernelBlock):
     needs = ("floating base", "feet")
     params: Params
     terms = Input(DynamicsTerms, text="the whole-body model at the present state")
-    target = Input(WholeBodyTarget, text="what to achieve")
+    target = Input(WholeBodyTarget, text="target of the whole body")
     phase = Input(PhaseState, text="the phase and the points in stance")
     joints = Input(JointState, text="joint angles and velocities")
     command = Output(WholeBodyCommand, text="torque, acceleration and contact forces")
@@ -244,7 +244,7 @@ class WholeBodyController(KernelBlock):
         robot: RobotDescription | None = None,
         graph_folder: Path | None = None,
     ) -> type[Block]:
-        """The class with the inputs of the tasks; a list that cannot be used is reported later."""
+        """Make the class with the inputs of the tasks; a list that cannot be used is reported later."""
         assert isinstance(params, cls.Params)
         try:
             chosen = choose_tasks(params.tasks, (graph_folder or folder, folder))
@@ -314,7 +314,7 @@ class WholeBodyController(KernelBlock):
         self._arrange()
 
     def _make_tasks(self, n: int) -> None:
-        """The tasks for each kind of phase; those of one entry share their part of the rows."""
+        """Make the tasks for each kind of phase; those of one entry share their part of the rows."""
         params = {kind: self._task_params(kind) for kind in PHASE_KINDS}
         counts = [
             chosen.kind.row_count(each, self.robot)
@@ -338,7 +338,7 @@ class WholeBodyController(KernelBlock):
             self._tasks[kind] = tasks
 
     def _task_params(self, kind: str) -> list[Parameters]:
-        """The parameters of all tasks in a kind of phase."""
+        """Return the parameters of all tasks in a kind of phase."""
         return [chosen.params(kind, getattr(self.params, kind)) for chosen in self._chosen]
 
     def prepare(self) -> None:
@@ -384,7 +384,7 @@ class WholeBodyController(KernelBlock):
 def _class_with(
     inputs: tuple[tuple[type[Task], str, str], ...], follow_motors: bool
 ) -> type[WholeBodyController]:
-    """The controller with inputs for tasks, each given by the task, its name there and here, and for motors."""
+    """Make the controller with inputs for tasks, each given by the task, its name there and here, and for motors."""
     body: dict[str, Any] = {
         "__doc__": WholeBodyController.__doc__,
         "__module__": WholeBodyController.__module__,
@@ -399,8 +399,8 @@ def _class_with(
 
 
 class ActiveCalls(NamedTuple):
-    """Which calls a step makes, each (1,) and not zero where it makes them: the tasks with the gains
-    of ``stand``, ``thrust`` or ``landing``, and what solves the program if a point is ``loaded``."""
+    """The calls that a step makes, each (1,) and not zero where it makes them: the tasks with the gains of ``stand``,
+    ``thrust`` or ``landing``, and the solver of the program if a point is ``loaded``."""
 
     stand: Indices1D
     thrust: Indices1D
@@ -453,8 +453,8 @@ def keep_solution(
 
 
 class HoldSettings(NamedTuple):
-    """What holds where no solution was found, each (1,): for how many ``ticks`` the last torque is
-    held, by which factor it decays in each, and the robot's ``weight`` [N]."""
+    """Settings for ticks without a solution, each (1,): the number of ``ticks`` for which the last torque is held, the
+    factor by which it decays in each, and the robot's ``weight`` [N]."""
 
     ticks: Indices1D
     decay: Array1D
@@ -470,8 +470,8 @@ def hold_torque(
     memory: SolverMemory,
     settings: HoldSettings,
 ) -> None:
-    """Where the program is ``unsolved`` (1,): the last solved torque, which decays, and then the torque that
-    carries the weight."""
+    """Hold the last solved torque where the program is ``unsolved`` (1,): it decays, and then gives way to the torque
+    that carries the weight."""
     if unsolved[0] == 0:
         return
     memory.failed += 1

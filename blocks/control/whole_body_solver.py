@@ -42,9 +42,9 @@ def solver_call(
     reduction: Reduction,
     solution: WholeBodySolution,
 ) -> KernelCall | PythonCall:
-    """The call that writes the solution of the program that ``reduce_program`` has reduced."""
+    """Return the call that writes the solution of the program that ``reduce_program`` has reduced."""
     if name != ACTIVE_SET:
-        return PythonCall(LibrarySolver(name, cones, program, reduction, solution).solve, ())
+        return PythonCall(ExternalSolver(name, cones, program, reduction, solution).solve, ())
     n, n_contacts = len(solution.acceleration), len(solution.force)
     if cones == "round":
         own = active_set_program(n, n_contacts, PLANES)
@@ -62,7 +62,7 @@ def fallback_call(
     reduction: Reduction,
     solution: WholeBodySolution,
 ) -> KernelCall | None:
-    """The call that solves the program where the solver ``name`` finds no solution.
+    """Return the call that solves the program where the solver ``name`` finds no solution.
 
     After a library's solver that is the own method. After the own method there is none with pyramids: of 59,000
     programs it solved all that DAQP could solve. With round cones its search fails in 2 of 50,000; then the
@@ -82,7 +82,7 @@ def fallback_call(
     return KernelCall(solve_with_pyramids, inside, reduction, pyramids, solution)
 
 
-class LibrarySolver:
+class ExternalSolver:
     """A library's solver on the reduced program, see ``whole_body_reduction``."""
 
     def __init__(

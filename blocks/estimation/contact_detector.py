@@ -10,11 +10,11 @@ from ..signals import ContactState, ContactSwitches, SwitchFault, SwitchHealth
 
 
 class ContactTimers(Signal):
-    """How long each switch has been open or closed, and which points are in contact."""
+    """Time that each switch has been open or closed, and the points in contact."""
 
     closed = Field("n_contacts", dtype="int64", text="ticks in a row a switch has been closed")
     opened = Field("n_contacts", dtype="int64", text="ticks in a row it has been open")
-    active = Field("n_contacts", dtype="bool", text="whether the point is in contact")
+    active = Field("n_contacts", dtype="bool", text="the point is in contact")
 
 
 class ContactDetector(Block):
@@ -25,7 +25,7 @@ class ContactDetector(Block):
     not interrupt a contact, and a foot that lands toe first is in contact at its toe only: the
     points of a foot do not influence one another.
 
-    ``SwitchMonitor`` says which switches are not to be believed: one at fault counts as open, and a heavy one as
+    ``SwitchMonitor`` finds the switches that are not to be believed: one at fault counts as open, and a heavy one as
     closed.
 
     The hold delays the report of a lift-off by the same time; a block that needs lift-off sooner
@@ -34,14 +34,17 @@ class ContactDetector(Block):
 
     class Params(Parameters):
         hold: float = live_parameter(
-            0.03, unit="s", ge=0.0, text="how long a point stays active after its switch opens"
+            0.03,
+            unit="s",
+            ge=0.0,
+            text="time for which a point stays active after its switch opens",
         )
         close_samples: int = live_parameter(
             1, ge=1, text="ticks a switch must be closed before its point is active"
         )
 
     class Constants(Signal):
-        """What follows from the parameters."""
+        """Constants derived from the parameters."""
 
         hold_samples = Field(dtype="int64", text="ticks a point stays active with an open switch")
 
@@ -49,8 +52,8 @@ class ContactDetector(Block):
     constants: Constants
 
     switches = Input(ContactSwitches, text="the raw switches")
-    faults = Input(SwitchHealth, default={}, text="which switches are not to be believed")
-    state = Output(ContactState, text="which points carry load")
+    faults = Input(SwitchHealth, default={}, text="switches that are not to be believed")
+    state = Output(ContactState, text="points that carry load")
     timers = State(ContactTimers, text="one timer a point")
 
     def prepare(self) -> None:

@@ -1,4 +1,4 @@
-"""Measures the delay from sensing to torque, and compares it with what the graph says."""
+"""Measures the delay from sensing to torque, and compares it with the graph's."""
 
 from __future__ import annotations
 
@@ -37,11 +37,9 @@ class DelayMemory(Signal):
 class DelayEstimatorParameters(Parameters):
     """The parameters of ``DelayEstimator``."""
 
-    nominal: float = parameter(
-        0.002, unit="s", ge=0.0, le=0.02, text="the delay by what the graph says"
-    )
+    nominal: float = parameter(0.002, unit="s", ge=0.0, le=0.02, text="nominal delay in the graph")
     follow: Literal["measured", "nominal"] = parameter(
-        "measured", text="which of both is the output"
+        "measured", text="the delay that is the output"
     )
     duration: float = parameter(
         0.6, unit="s", gt=0.0, text="the first part of a run, in which it is measured"
@@ -68,20 +66,20 @@ class DelayEstimatorParameters(Parameters):
 
 
 class DelayConstants(Signal):
-    """When the delay is measured, in ticks."""
+    """Times of the delay's measurement, in ticks."""
 
     first_tick = Field(dtype="int64", text="tick from which on the measurement may count")
     last_tick = Field(dtype="int64", text="tick in which it ends")
 
 
 class DelayScratch(Signal):
-    """Room for a tick of ``DelayEstimator``."""
+    """Scratch memory of one tick of ``DelayEstimator``."""
 
     torque_change = Field("n_joints", unit="N m", text="change of the measured torques")
 
 
 class DelayEstimator(Block):
-    """The delay from sensing to torque, which the graph says once, measured by the torques.
+    """The delay from sensing to torque, which the graph gives once, measured by the torques.
 
     The command that is computed in tick k, at t_k, takes effect at t_k + d. The measured torques
     are means over the tick before. With d = (j + share) T, T being the period of this block, their
@@ -94,8 +92,8 @@ class DelayEstimator(Block):
     change of the commands explains at least ``least_match`` of the change of the torques, so only
     while the drives get torques and no joint feedback.
 
-    ``nominal`` is what the graph says: ``{from: robot.delay}`` is what the robot's driver or the
-    simulator says. With ``follow: measured`` the output is the measured delay as soon as it counts,
+    ``nominal`` is the graph's value: ``{from: robot.delay}`` is that of the robot's driver or
+    the simulator. With ``follow: measured`` the output is the measured delay as soon as it counts,
     less ``usual``, by which it is longer than the nominal one where that is right, and at first and
     otherwise the nominal one. With ``follow: nominal`` it is always that. The result of a run has a
     warning where both differ by more than ``tolerance``.
@@ -121,7 +119,7 @@ class DelayEstimator(Block):
     needs = ("robot",)
     params: DelayEstimatorParameters
     constants: DelayConstants
-    command = Input(JointCommand, text="what the drives were sent")
+    command = Input(JointCommand, text="command that was sent to the drives")
     joints = Input(JointState, text="the torques that they report")
     estimate = Output(DelayEstimate, text="the delay to compensate")
     memory = State(DelayMemory, text="sums over the run so far")
@@ -173,7 +171,7 @@ class DelayEstimator(Block):
             solve_delay(memory, params, period)
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The nominal and the measured delay."""
+        """Return the nominal and the measured delay."""
         values: dict[str, Metric] = {"delay_nominal_ms": 1e3 * self.params.nominal}
         if self.memory.delay >= 0.0:
             values["delay_measured_ms"] = 1e3 * float(self.memory.delay)

@@ -30,13 +30,13 @@ from ..signals import (
 from .leg_forces import force_along, solve_leg
 
 _SLIGHT = 0.05
-"""The share of a joint's peak torque that is added to what was asked of it."""
+"""The share of a joint's peak torque that is added to its commanded torque."""
 _SPREAD = 0.05
 """Points whose three moments of inertia, as shares of half their sum, have a smaller product are in a line, or nearly."""
 
 
 class Suspect(IntEnum):
-    """What disagrees with all the rest."""
+    """The sensor or motor that disagrees with all the rest."""
 
     NONE = 0
     GYROSCOPE = 1
@@ -46,7 +46,7 @@ class Suspect(IntEnum):
     TORQUE = 3
     """A joint's torque is off its command."""
     ENCODER = 4
-    """A joint's angle changes otherwise than its speed says."""
+    """A joint's angle changes otherwise than its speed implies."""
     SWITCHES = 5
     """None is closed under feet that carry the robot."""
 
@@ -59,7 +59,7 @@ class FaultDetectorParams(Parameters):
     )
     force_window: float = parameter(0.4, unit="s", gt=0.0, text="the same of forces")
     lateness: float = parameter(
-        0.004, unit="s", ge=0.0, text="by which one measurement may be later than the other"
+        0.004, unit="s", ge=0.0, text="largest delay of one measurement behind the other"
     )
     gyroscope_error: float = parameter(
         0.08, unit="rad/s", ge=0.0, text="its largest steady error; zero: not judged"
@@ -78,7 +78,7 @@ class FaultDetectorParams(Parameters):
     )  # fmt: skip
     open_time: float = parameter(
         0.15, unit="s", ge=0.0,
-        text="how long all switches may be open under load; zero: not judged",
+        text="time for which all switches may be open under load; zero: not judged",
     )  # fmt: skip
     open_load: float = parameter(
         0.5, gt=0.0, text="from which load on the feet on, in weights of the robot"
@@ -100,9 +100,9 @@ class FaultDetectorState(Signal):
     suspect = Field(dtype="int64", values=Suspect, text="the first that was found")
     tick = Field(dtype="int64", text="when")
     place = Field(dtype="int64", text="its axis or joint")
-    value = Field(text="by how much it disagrees")
+    value = Field(text="its disagreement")
     share = Field(6, text="largest disagreement so far of each suspect, as a share of its limit")
-    started = Field(dtype="bool", text="whether there was a last tick")
+    started = Field(dtype="bool", text="there was a last tick")
     standing = Field(dtype="int64", text="ticks in a row in which the points stood")
     turn = Field(3, unit="rad", text="turn by the gyroscope less turn over the feet")
     rate = Field(3, unit="rad/s", text="the gyroscope's mean")
@@ -118,7 +118,7 @@ class FaultDetectorState(Signal):
 
 
 class FaultDetectorConstants(Signal):
-    """What the robot's description and the parameters say."""
+    """Constants of the robot's description and the parameters."""
 
     foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
     leg_joints = Field(
@@ -132,7 +132,7 @@ class FaultDetectorConstants(Signal):
 
 
 class FaultDetectorScratch(Signal):
-    """What a tick computes on its way."""
+    """Intermediate values of a tick."""
 
     stands = Field("n_contacts", dtype="bool", text="points that stand")
     arm = Field(("n_contacts", 3), unit="m", text="points from their mean, world axes")
@@ -176,7 +176,7 @@ class FaultDetector(Block):
 
     It only warns, for a robot often survives what is found, and damping would make it fall. The first suspect is kept in the state, in
     the metrics ``suspect`` and ``suspect_time_s`` and in the result's warnings. ``SafetyMonitor`` judges what must end a run.
-    ``largest_disagreement`` says how near a run came to a warning, as a share of the limit.
+    ``largest_disagreement`` is how near a run came to a warning, as a share of the limit.
 
     Not found are motors whose torque constant is less than the drive believes, for their current is as commanded; what begins in the
     air before the robot stands again; and sensors that are late while nothing moves.
@@ -192,17 +192,17 @@ class FaultDetector(Block):
     joints = Input(JointState, text="the measured joints")
     terms = Input(DynamicsTerms, text="the model's terms")
     load = Input(FootLoad, text="the load on each foot, by the legs' torques")
-    contacts = Input(ContactState, text="which points are in contact")
+    contacts = Input(ContactState, text="points in contact")
     switches = Input(ContactSwitches, text="the raw switches")
     phase = Input(PhaseState, text="the phase the robot is in")
-    command = Input(JointCommand, text="what the drives get")
+    command = Input(JointCommand, text="command to the drives")
     state = State(FaultDetectorState, text="sums, and the first suspect")
 
     @classmethod
     def state_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
-        """The number of joints of the longest leg."""
+        """Return the number of joints of the longest leg."""
         assert robot is not None
         return {"n_leg_joints": leg_joints(robot).shape[1]}
 
@@ -264,7 +264,7 @@ class FaultDetector(Block):
         return begins
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The first suspect, and how near the run came to one."""
+        """Return the first suspect, and how near the run came to one."""
         state = self.state
         result: dict[str, Metric] = {"largest_disagreement": float(state.share.max())}
         if state.suspect != Suspect.NONE:
@@ -273,7 +273,7 @@ class FaultDetector(Block):
         return result
 
     def warnings(self) -> Sequence[str]:
-        """The first suspect, in words."""
+        """Describe the first suspect in words."""
         if self.state.suspect == Suspect.NONE:
             return ()
         return (f"from {self._time():g} s on: {self._reason()}",)
@@ -282,7 +282,7 @@ class FaultDetector(Block):
         return int(self.state.tick) * self.context.clock.base_period
 
     def _reason(self) -> str:
-        """What is suspected, by its measured value and its limit."""
+        """Describe the suspect in words, by its measured value and its limit."""
         suspect, value, p = Suspect(int(self.state.suspect)), float(self.state.value), self.params
         place, joints = int(self.state.place), self.robot.joints
         if suspect == Suspect.GYROSCOPE:
@@ -327,7 +327,7 @@ def judge(state: FaultDetectorState, suspect: int, place: int, value: float, lim
 
 @kernel
 def allowance(error: float, change: float, params: FaultDetectorParams) -> float:
-    """What a sum may reach where the measured value is ``change`` off its mean; zero: not judged."""
+    """Return the largest sum that is allowed where the measured value is ``change`` off its mean; zero: not judged."""
     return error * params.window + params.lateness * abs(change) if error > 0.0 else 0.0
 
 
@@ -390,7 +390,7 @@ def find_standing(
     phase: PhaseState,
     scratch: FaultDetectorScratch,
 ) -> None:
-    """The points that stand by contact, switch and phase."""
+    """Find the points that stand by contact, switch and phase."""
     on_the_ground = phase.phase != Phase.FLIGHT and phase.phase != Phase.HANG
     for point in range(scratch.stands.shape[0]):
         touches = contacts.active[point] and switches.closed[point]
@@ -401,7 +401,7 @@ def find_standing(
 def turn_over_feet(
     joints: JointState, terms: DynamicsTerms, slip_speed: float, scratch: FaultDetectorScratch
 ) -> bool:
-    """The base's rate from the points that stand; whether there are enough, and do not slide."""
+    """Compute the base's rate from the points that stand; return whether there are enough, and do not slide."""
     mean, arm, moved = scratch.mean, scratch.arm, scratch.moved
     count, first = 0, terms.velocity.shape[0] - joints.velocity.shape[0]
     mean[:] = 0.0
@@ -501,7 +501,7 @@ def compare_gyroscope(
 
 @kernel
 def is_slow(state: FaultDetectorState, rest_speed: float) -> bool:
-    """Whether no joint moves fast for long."""
+    """Check whether no joint moves fast for long."""
     slow = True
     for k in range(state.speed.shape[0]):
         slow = slow and abs(state.speed[k]) < rest_speed
@@ -516,7 +516,8 @@ def weigh(
     constants: FaultDetectorConstants,
     scratch: FaultDetectorScratch,
 ) -> None:
-    """What the force on the base at rest lacks by the legs' torques: of M_b a - J_b' f the force, in the base's axes."""
+    """Compute the force on the base at rest that the legs' torques leave unexplained: of M_b a - J_b' f the force, in
+    the base's axes."""
     mass, a, lacking, force = terms.mass_matrix, imu.specific_force, scratch.lacking, scratch.force
     first = terms.velocity.shape[0] - joints.torque.shape[0]
     for row in range(mass.shape[0]):

@@ -31,23 +31,25 @@ class FootLoadMemory(Signal):
     """The state of ``FootLoadEstimator``."""
 
     force = Field(("n_contacts", 3), unit="N", frame="world", text="of each point, filtered")
-    loaded = Field("n_feet", dtype="bool", text="whether each foot carries load")
+    loaded = Field("n_feet", dtype="bool", text="each foot carries load")
     touched = Field(
         "n_contacts",
         dtype="bool",
-        text="whether each point has touched, or rested, while its foot stands",
+        text="each point has touched, or rested, while its foot stands",
     )
     ground = Field(
         "n_contacts",
         unit="m",
         frame="world",
-        text="where it rested last, or the lowest height at which it has touched since",
+        text="place of its last rest, or the lowest height at which it has touched since",
     )
-    still = Field("n_contacts", unit="s", text="how long each point has neither risen nor sunk")
+    still = Field(
+        "n_contacts", unit="s", text="time for which each point has neither risen nor sunk"
+    )
 
 
 class FootLoadConstants(Signal):
-    """What the robot's description and the parameters say."""
+    """Constants of the robot's description and the parameters."""
 
     foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
     leg_joints = Field(
@@ -58,7 +60,7 @@ class FootLoadConstants(Signal):
 
 
 class FootLoadScratch(Signal):
-    """What a tick computes on its way."""
+    """Intermediate values of a tick."""
 
     normal = Field(("n_leg_joints", "n_leg_joints"), text="J' J of a leg, damped")
     needed = Field("n_joints", unit="N m", text="torques that the ground gives")
@@ -126,20 +128,18 @@ class FootLoadEstimator(Block):
     constants: FootLoadConstants
     terms = Input(DynamicsTerms, text="the model's terms")
     joints = Input(JointState, text="measured torques")
-    switches = Input(ContactState, text="which points have contact by their switches")
+    switches = Input(ContactState, text="points with contact by their switches")
     closed = Input(ContactSwitches, text="the raw switches")
     phase = Input(PhaseState, text="the phase, of the tick before")
     load = Output(FootLoad, text="force and centre of pressure of every foot")
-    contacts = Output(
-        ContactState, text="which points have contact by switches or by their foot's load"
-    )
+    contacts = Output(ContactState, text="points with contact by switches or by their foot's load")
     memory = State(FootLoadMemory, text="the filter, and where points have touched")
 
     @classmethod
     def state_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
-        """The number of joints of the longest leg."""
+        """Return the number of joints of the longest leg."""
         assert robot is not None
         return {"n_leg_joints": leg_joints(robot).shape[1]}
 

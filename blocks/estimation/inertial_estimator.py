@@ -49,13 +49,13 @@ class BaseEstimate(Signal):
     accelerometer_bias = Field(3, unit="m/s^2", frame="body", text="learnt while standing still")
     mean_rate = Field(3, unit="rad/s", frame="body", text="low-passed gyroscope")
     mean_joint_rate = Field("n_joints", unit="rad/s", text="low-passed joint velocities")
-    anchor = Field(("n_contacts", 3), unit="m", frame="world", text="where the points stand")
-    anchored = Field("n_contacts", dtype="bool", text="which points have an anchor")
+    anchor = Field(("n_contacts", 3), unit="m", frame="world", text="places where the points stand")
+    anchored = Field("n_contacts", dtype="bool", text="points with an anchor")
     ballistic_velocity = Field(
         3, unit="m/s", frame="world", text="velocity of the CoM at the start of the free fall"
     )
     flight_ticks = Field(dtype="int64", text="ticks since the last trusted contact")
-    started = Field(dtype="bool", text="whether the first sample has been seen")
+    started = Field(dtype="bool", text="the first sample has been seen")
 
 
 class BiasSamples(Signal):
@@ -75,7 +75,7 @@ class InertialParameters(Parameters):
         "imu", text="the prediction in flight: by the IMU, or by a free fall of the CoM"
     )
     slope: TwoNumbers = parameter(
-        (0.0, 0.0), unit="rad", text="by which the ground rises ahead and to the left at the start"
+        (0.0, 0.0), unit="rad", text="slope of the ground ahead and to the left at the start"
     )
     velocity_gain: float = live_parameter(
         0.03, gt=0.0, le=1.0, text="gain of the legs' velocity correction, per tick"
@@ -100,14 +100,12 @@ class InertialConstants(Signal):
     period = Field(unit="s", text="of a tick")
     filtering = Field(unit="", text="share of a change that the low-pass takes over in a tick")
     block_size = Field(dtype="int64", text="samples in a block from which a bias is learnt")
-    starts_level = Field(dtype="bool", text="whether the contact points give the first tilt")
-    gradient = Field(
-        2, unit="", text="how much the ground rises ahead and to the left at the start"
-    )
+    starts_level = Field(dtype="bool", text="the contact points give the first tilt")
+    gradient = Field(2, unit="", text="slope of the ground ahead and to the left at the start")
 
 
 class InertialScratch(Signal):
-    """What a tick computes on its way."""
+    """Intermediate values of a tick."""
 
     gyro = Field(3, unit="rad/s", frame="body", text="the gyroscope's sample within limits")
     force = Field(3, unit="m/s^2", frame="body", text="the accelerometer's, without its bias")
@@ -119,11 +117,11 @@ class InertialScratch(Signal):
     vector = Field(3, text="a vector")
     place = Field(("n_contacts", 3), unit="m", frame="world", text="points from the base")
     rate = Field(("n_contacts", 3), unit="m/s", frame="world", text="their velocities from there")
-    weight = Field("n_contacts", unit="", text="how far each point is trusted, 0 to 1")
+    weight = Field("n_contacts", unit="", text="trust in each point, 0 to 1")
 
 
 class LegKinematics(NamedTuple):
-    """Where the contact points are: see ``ContactKinematics`` and ``StandingPoints``."""
+    """Places of the contact points: see ``ContactKinematics`` and ``StandingPoints``."""
 
     bodies: RigidBodies
     contacts: ContactGeometry
@@ -134,7 +132,7 @@ class LegKinematics(NamedTuple):
 class InertialEstimator(Block):
     """The base of estimators that integrate the IMU and are corrected by the legs (paper, II-B).
 
-    ``StateEstimator`` says how the state is predicted, in contact and in flight, how the legs correct it,
+    ``StateEstimator`` describes how the state is predicted, in contact and in flight, how the legs correct it,
     and where it starts.
 
     The step of a derived class calls ``predict``, corrects the orientation, weighs the points, and
@@ -146,7 +144,7 @@ class InertialEstimator(Block):
     Scratch = InertialScratch
     needs = ("floating base", "imu", "feet")
     starts_level: ClassVar[bool]
-    """Whether the first tilt is taken from the contact points; otherwise from the accelerometer."""
+    """True if the first tilt is taken from the contact points; otherwise it is from the accelerometer."""
 
     params: InertialParameters
     constants: InertialConstants
@@ -154,10 +152,10 @@ class InertialEstimator(Block):
 
     imu = Input(ImuReading, text="gyroscope, and accelerometer as the mean over the tick")
     joints = Input(JointState, text="joint angles and velocities")
-    contacts = Input(ContactState, text="which points carry load; a short hold serves best")
+    contacts = Input(ContactState, text="points that carry load; a short hold serves best")
     base = Output(BaseState, text="pose and velocity of the base")
     estimate = State(BaseEstimate, text="the filter")
-    learning = State(BiasSamples, text="what a bias is learnt from")
+    learning = State(BiasSamples, text="samples from which a bias is learnt")
 
     def setup(self) -> None:
         estimate, scratch = self.estimate, self.scratch
@@ -290,7 +288,7 @@ def watch_motion(
 
 @kernel
 def largest_of(values: Array1D) -> float:
-    """The largest magnitude among some values."""
+    """Return the largest magnitude among some values."""
     largest = 0.0
     for i in range(values.shape[0]):
         largest = max(largest, abs(values[i]))
@@ -299,7 +297,7 @@ def largest_of(values: Array1D) -> float:
 
 @kernel
 def count_standing(active: Flags1D) -> int:
-    """The number of points in contact."""
+    """Count the points in contact."""
     standing = 0
     for point in range(active.shape[0]):
         standing += bool(active[point])
@@ -308,7 +306,7 @@ def count_standing(active: Flags1D) -> int:
 
 @kernel
 def is_unaccelerated(force: Array1D) -> bool:
-    """Whether the accelerometer reads about 1 g, so that it shows the vertical."""
+    """Check whether the accelerometer reads about 1 g, so that it shows the vertical."""
     x, y, z = force[0], force[1], force[2]
     return abs(math.sqrt(x * x + y * y + z * z) - GRAVITY) <= 0.1 * GRAVITY
 
@@ -390,7 +388,7 @@ def fall_freely(
     constants: InertialConstants,
     scratch: InertialScratch,
 ) -> None:
-    """In flight, let the centre of mass fall freely and the base follow from the joints."""
+    """Let the centre of mass fall freely in flight, and the base follow from the joints."""
     ticks, velocity, change = estimate.flight_ticks, scratch.vector, scratch.acceleration
     if ticks == 0:
         return

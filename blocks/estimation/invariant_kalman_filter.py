@@ -60,8 +60,8 @@ _START_PLACE = 0.02
 
 
 class TrackedContacts(NamedTuple):
-    """Where the contact points are: see ``ContactKinematics``. ``tracked`` are those of the filter,
-    which does without ``joint_rates``: they are zero."""
+    """Places of the contact points: see ``ContactKinematics``. ``tracked`` are those of the filter, which does without
+    ``joint_rates``: they are zero."""
 
     bodies: RigidBodies
     contacts: ContactGeometry
@@ -71,7 +71,7 @@ class TrackedContacts(NamedTuple):
 
 
 def tracked_points(robot: RobotDescription) -> tuple[Array, Array]:
-    """The points of the feet that stand still on the ground, and their heights above it.
+    """Return the points of the feet that stand still on the ground, and their heights above it.
 
     A foot that rolls over its toe by the angle a moves the centre of the toe's rubber, of radius r, by
     r a. The point of the foot that was lowest moves by r (a - sin a) only, a hundredth of that. So the
@@ -148,7 +148,7 @@ class InvariantKalmanFilter(Block):
 
     imu = Input(ImuReading, text="gyroscope, and accelerometer as the mean over the tick")
     joints = Input(JointState, text="joint angles and velocities")
-    contacts = Input(ContactState, text="which points carry load; a short hold serves best")
+    contacts = Input(ContactState, text="points that carry load; a short hold serves best")
     base = Output(BaseState, text="pose and velocity of the base")
     health = Output(EstimatorHealth, text="standard deviations of the estimate")
     estimate = State(InvariantEstimate, text="the filter")
@@ -157,7 +157,7 @@ class InvariantKalmanFilter(Block):
     def state_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
-        """The vectors of the state and the size of the error."""
+        """Return the number of vectors in the state and the size of the error."""
         assert robot is not None
         n = len(robot.contacts)
         return {"n_vectors": 2 + n, "n_errors": 15 + 3 * n + len(robot.joints)}
@@ -229,7 +229,7 @@ def take_samples(
     scratch: InvariantScratch,
     health: EstimatorHealth,
 ) -> None:
-    """The IMU's sample without biases, and its noise for each axis, by whether it is saturated."""
+    """Take the IMU's sample without biases, and its noise for each axis, by whether it is saturated."""
     rate, force, noise = scratch.rate, scratch.force, scratch.noise
     rate[:] = min(max(imu.angular_velocity, -_FASTEST_TURN), _FASTEST_TURN)
     force[:] = min(max(imu.specific_force, -_STRONGEST_FORCE), _STRONGEST_FORCE)
@@ -323,7 +323,7 @@ def start(
 
 @kernel
 def start_covariance(estimate: InvariantEstimate, params: InvariantFilterParameters) -> None:
-    """The variances before the feet have been used; no contact point is in the state."""
+    """Set the variances before the feet have been used; no contact point is in the state."""
     bias = 9 + 3 * estimate.present.shape[0]
     for k in range(estimate.covariance.shape[0]):
         deviation = params.encoder_offset

@@ -35,15 +35,15 @@ class InvariantEstimate(Signal):
         ("n_vectors", 3), frame="world",
         text="velocity [m/s], position [m], centres of the contacts' rubber [m]",
     )  # fmt: skip
-    present = Field("n_contacts", dtype="bool", text="which contact points are in the state")
+    present = Field("n_contacts", dtype="bool", text="contact points in the state")
     gyro_bias = Field(3, unit="rad/s", frame="body", text="reading minus true value")
     accelerometer_bias = Field(3, unit="m/s^2", frame="body", text="reading minus true value")
     encoder_offset = Field("n_joints", unit="rad", text="joint readings minus true angles")
     covariance = Field(("n_errors", "n_errors"), text="of the error")
     angular_velocity = Field(3, unit="rad/s", frame="body", text="at the last tick, without bias")
-    started = Field(dtype="bool", text="whether the first sample has been seen")
-    stood = Field(dtype="bool", text="whether a point has been accepted since the start")
-    flown = Field(dtype="bool", text="whether all points have left the ground since then")
+    started = Field(dtype="bool", text="the first sample has been seen")
+    stood = Field(dtype="bool", text="a point has been accepted since the start")
+    flown = Field(dtype="bool", text="all points have left the ground since then")
     saturated_ticks = Field(dtype="int64", text="ticks with a saturated sample")
     saturated_run = Field(
         6,
@@ -92,10 +92,10 @@ class InvariantFilterParameters(Parameters):
         2e-4, unit="m", gt=0, text="noise of a contact point's place by leg kinematics, per axis"
     )
     contact_noise: float = parameter(
-        1e-4, unit="m", ge=0, text="how far a contact point drifts by itself in a second, per axis"
+        1e-4, unit="m", ge=0, text="drift of a contact point by itself in a second, per axis"
     )
     slide_noise: float = parameter(
-        1e-3, unit="m", ge=0, text="how far a foot slides as a whole in a second, per axis"
+        1e-3, unit="m", ge=0, text="slide of a foot as a whole in a second, per axis"
     )
     impact_slide: float = parameter(
         0.0,
@@ -131,11 +131,11 @@ class InvariantFilterParameters(Parameters):
 
 
 class InvariantConstants(Signal):
-    """What the robot's description and the parameters say."""
+    """Constants of the robot's description and the parameters."""
 
     foot = Field("n_contacts", dtype="int64", text="the foot of each contact point")
     height = Field("n_contacts", unit="m", text="of the tracked points over the ground")
-    gradient = Field(2, unit="", text="how much the ground rises at the start: zero, it is level")
+    gradient = Field(2, unit="", text="slope of the ground at the start: zero, it is level")
     heading_levers = Field(("n_contacts", 2), unit="m", text="see ``ContactKinematics``")
     place_noise = Field((3, 3), unit="m^2", text="covariance of a point's measured place")
     gyro_range = Field(unit="rad/s", text="the gyroscope saturates here; infinite: never")
@@ -147,7 +147,7 @@ class InvariantConstants(Signal):
 
 
 class InvariantScratch(Signal):
-    """What a tick computes on its way; symbols are those of ``mathematics/invariant_filter``."""
+    """Intermediate values of a tick; symbols are those of ``mathematics/invariant_filter``."""
 
     rate = Field(3, unit="rad/s", frame="body", text="the gyroscope's sample within limits")
     force = Field(3, unit="m/s^2", frame="body", text="the accelerometer's, without its bias")
@@ -341,7 +341,7 @@ def correct_heights(
 
 @kernel
 def weigh_residual(noise: Array2D, estimate: InvariantEstimate, scratch: InvariantScratch) -> float:
-    """The squared Mahalanobis distance of the residual."""
+    """Return the squared Mahalanobis distance of the residual."""
     return squared_distance(
         estimate.covariance, scratch.jacobian, noise, scratch.residual, scratch.cross_covariance,
         scratch.inverse, scratch.block,

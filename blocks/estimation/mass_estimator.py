@@ -34,8 +34,8 @@ from ...runtime.language.signals import Field, Signal
 from ..signals import DynamicsTerms, JointState, MassEstimate, Phase, PhaseState
 
 SCALE, COM, TILT, FRICTION = 0, 1, 4, 6
-"""Where the unknowns begin: the factor on all masses; the offset of the torso's CoM [m] (3); the
-error of the estimated tilt [rad] (2); by joint its unknown friction, as a share of its friction."""
+"""Offsets of the unknowns: the factor on all masses; the offset of the torso's CoM [m] (3); the error of the estimated
+tilt [rad] (2); by joint its unknown friction, as a share of its friction."""
 _DAMPING = 1e-8
 """Added to the squared lever arms [m^2] of the joints, so that a straight leg has a finite inverse."""
 
@@ -49,7 +49,7 @@ class MassMemory(Signal):
     covariance = Field(("n_unknowns", "n_unknowns"), text="of its error")
     published = Field(4, text="factor on all masses and torso's CoM [m], as they are published")
     ticks = Field(dtype="int64", text="ticks so far while standing; none counts after the thrust")
-    over = Field(dtype="bool", text="whether the robot has thrust, so that the estimate stays")
+    over = Field(dtype="bool", text="the robot has thrust, so that the estimate stays")
 
 
 class MassParameters(Parameters):
@@ -116,7 +116,7 @@ class MassParameters(Parameters):
 
 
 class MassConstants(Signal):
-    """What the robot's description and the parameters say."""
+    """Constants of the robot's description and the parameters."""
 
     mass = Field(unit="kg", text="of the robot")
     torso_mass = Field(unit="kg", text="of the torso")
@@ -136,7 +136,7 @@ class MassConstants(Signal):
 
 
 class MassScratch(Signal):
-    """What a tick of ``MassEstimator`` computes on its way."""
+    """Intermediate values of a tick of ``MassEstimator``."""
 
     acceleration = Field("n_velocities", text="derivative of the filtered velocity")
     force = Field("n_velocities", text="generalised force that the acceleration and gravity need")
@@ -200,7 +200,7 @@ class MassEstimator(Block):
     def state_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
-        """The number of unknowns, and of the joints of the longest leg."""
+        """Return the number of unknowns, and of the joints of the longest leg."""
         assert robot is not None
         longest = leg_joints(robot).shape[1]
         return {"n_unknowns": FRICTION + len(robot.joints), "n_leg_joints": longest}
@@ -284,7 +284,7 @@ class MassEstimator(Block):
         memory.published[:] += (memory.unknowns[:4] - memory.published) * constants.following
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The estimate at the end."""
+        """Return the estimate at the end."""
         memory = self.memory
         x, y, z = (1e3 * value for value in memory.unknowns[COM:TILT].tolist())
         return {
@@ -299,7 +299,7 @@ class MassEstimator(Block):
 
 @kernel
 def any_stance(phase: PhaseState) -> bool:
-    """Whether any point carries load."""
+    """Check whether any point carries load."""
     loaded = False
     for point in range(phase.stance.shape[0]):
         loaded = loaded or bool(phase.stance[point])
@@ -327,8 +327,8 @@ def form_equations(
     constants: MassConstants,
     scratch: MassScratch,
 ) -> None:
-    """The equations' residual at the published estimate without the unknown parts of tilt and
-    friction, and its derivative by the unknowns.
+    """Form the equations' residual at the published estimate without the unknown parts of tilt and friction, and its
+    derivative by the unknowns.
 
     The derivatives are those at rest: noise of the acceleration in them would bias the result.
     """
@@ -355,7 +355,7 @@ def form_equations(
 def map_torques_to_base(
     terms: DynamicsTerms, phase: PhaseState, constants: MassConstants, scratch: MassScratch
 ) -> None:
-    """The map G from joint torques to the generalised force on the base, leg by leg."""
+    """Compute the map G from joint torques to the generalised force on the base, leg by leg."""
     normal, coupling = scratch.normal, scratch.coupling
     scratch.force_map[:] = 0.0
     for foot in range(constants.leg_joints.shape[0]):
@@ -392,7 +392,7 @@ def add_jacobian_row(row: Array1D, joints: Indices1D, scratch: MassScratch) -> N
 def split_friction(
     memory: MassMemory, params: MassParameters, constants: MassConstants, scratch: MassScratch
 ) -> None:
-    """The part of the joints' friction that their speed tells, and what stays unknown."""
+    """Split the joints' friction into the part that their speed tells, and the unknown rest."""
     for i in range(constants.friction.shape[0]):
         speed = memory.velocity[6 + i]
         known_share = tanh(speed / params.friction_speed)
@@ -429,7 +429,7 @@ def correct_by_equation(
 
 @kernel
 def equation_noise(k: int, terms: DynamicsTerms, constants: MassConstants) -> float:
-    """The standard deviation of an equation's error [N, N m].
+    """Return the standard deviation of an equation's error [N, N m].
 
     The gyroscope's noise adds the inertia times the noise of the angular acceleration.
     """

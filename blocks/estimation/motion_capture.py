@@ -15,7 +15,7 @@ from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.random_stream import RandomStream, StreamState
 from ...runtime.language.signals import Field, Signal
-from ..signals import BaseState, PlaceMeasurement, RobotTruth
+from ..signals import BaseState, PoseMeasurement, RobotTruth
 
 LINE = 256
 """Measurements that may be under way, and estimates that are remembered."""
@@ -25,10 +25,10 @@ class CaptureLine(StreamState):
     """The measurements under way, and the random stream."""
 
     number = Field(LINE, dtype="int64", text="of each measurement; zero: dropped")
-    time = Field(LINE, unit="s", text="when it was taken")
+    time = Field(LINE, unit="s", text="time of the measurement")
     position = Field((LINE, 3), unit="m", frame="world", text="base origin")
     heading = Field(LINE, unit="rad", frame="world", text="heading of the base")
-    taken = Field(dtype="int64", text="how many have been taken")
+    taken = Field(dtype="int64", text="number of measurements taken")
 
 
 class MotionCapture(Block):
@@ -53,10 +53,10 @@ class MotionCapture(Block):
         seed: int = parameter(0, ge=0, text="of the noise")
 
     params: Params
-    truth = Input(RobotTruth, text="where the robot is")
-    place = Output(PlaceMeasurement, text="the last measurement that has come")
+    truth = Input(RobotTruth, text="true place of the robot")
+    pose = Output(PoseMeasurement, text="the last measurement that has come")
     line = State(CaptureLine, text="measurements under way")
-    last = State(PlaceMeasurement, text="the last measurement that has come")
+    last = State(PoseMeasurement, text="the last measurement that has come")
 
     def save_state(self) -> None:
         """Keep where the stream is."""
@@ -78,7 +78,7 @@ class MotionCapture(Block):
 
     def step(self) -> None:
         """Take a measurement, and give the one whose time has come; the numbers are NumPy's."""
-        line, last, place, errors = self.line, self.last, self.place, self._errors
+        line, last, pose, errors = self.line, self.last, self.pose, self._errors
         here, number = int(line.taken) % LINE, int(line.taken) + 1
         self._random.generator.standard_normal(out=errors)
         lost = 0.5 * (1.0 + math.erf(errors[4] / math.sqrt(2.0))) < self.params.dropout
@@ -95,22 +95,22 @@ class MotionCapture(Block):
         if number > self._late and line.number[come] > 0:
             last.number[()], last.time[()] = line.number[come], line.time[come]
             last.position[:], last.heading[()] = line.position[come], line.heading[come]
-        place.number[()], place.time[()] = last.number, last.time
-        place.position[:], place.heading[()] = last.position, last.heading
+        pose.number[()], pose.time[()] = last.number, last.time
+        pose.position[:], pose.heading[()] = last.position, last.heading
 
 
-class PlaceHistory(Signal):
+class PoseHistory(Signal):
     """The last estimates, and how the estimator's world lies in that of the measurements."""
 
     position = Field((LINE, 2), unit="m", text="places of the base by the estimator")
     heading = Field(LINE, unit="rad", text="headings of the base by the estimator")
     last = Field(dtype="int64", text="number of the last measurement that was used")
-    used = Field(dtype="int64", text="how many were used")
+    used = Field(dtype="int64", text="number of measurements used")
     offset = Field(2, unit="m", text="origin of the estimator's world in that of the measurements")
     turn = Field(unit="rad", text="its heading there")
 
 
-class PlaceCorrection(Block):
+class PoseCorrection(Block):
     """Takes the drift of place and heading off an estimate, with measurements that come late and seldom.
 
     The estimator's world lies at an offset t, turned by d about the vertical, in the measurements' world: p' = R_z(d) p + t. A measurement is
@@ -125,23 +125,23 @@ class PlaceCorrection(Block):
         )
 
     class Scratch(Signal):
-        """Room for a step."""
+        """Scratch memory of one step."""
 
         turn = Field(4, text="quaternion of the rotation")
 
     params: Params
     state = Input(BaseState, text="pose and velocity of the base by the estimator")
-    place = Input(PlaceMeasurement, text="the last measurement")
+    pose = Input(PoseMeasurement, text="the last measurement")
     base = Output(BaseState, text="the same in the world of the measurements")
-    history = State(PlaceHistory, text="the last estimates, and the drift")
+    history = State(PoseHistory, text="the last estimates, and the drift")
 
     @kernel
     @staticmethod
     def step(
         state: BaseState,
-        place: PlaceMeasurement,
+        pose: PoseMeasurement,
         base: BaseState,
-        history: PlaceHistory,
+        history: PoseHistory,
         params: Params,
         scratch: Scratch,
         clock: Clock,
@@ -149,14 +149,14 @@ class PlaceCorrection(Block):
         here = clock.tick % LINE
         history.position[here, :] = state.position[:2]
         history.heading[here] = yaw(state.orientation)
-        taken = round(place.time / clock.base_period)
+        taken = round(pose.time / clock.base_period)
         age = clock.tick - taken
-        if place.number > history.last and 0 <= age < LINE:
-            history.last = place.number
+        if pose.number > history.last and 0 <= age < LINE:
+            history.last = pose.number
             history.used += 1
             then = taken % LINE
             share = max(params.gain, 1.0 / history.used)
-            error = place.heading - history.heading[then] - history.turn
+            error = pose.heading - history.heading[then] - history.turn
             x, y = history.position[then, 0], history.position[then, 1]
             # The estimate of that time keeps its place while the world turns about it.
             sine, cosine = sincos(history.turn)
@@ -164,8 +164,8 @@ class PlaceCorrection(Block):
             py = sine * x + cosine * y + history.offset[1]
             history.turn += share * wrap(error)
             sine, cosine = sincos(history.turn)
-            history.offset[0] = px + share * (place.position[0] - px) - (cosine * x - sine * y)
-            history.offset[1] = py + share * (place.position[1] - py) - (sine * x + cosine * y)
+            history.offset[0] = px + share * (pose.position[0] - px) - (cosine * x - sine * y)
+            history.offset[1] = py + share * (pose.position[1] - py) - (sine * x + cosine * y)
         turn_about_vertical(state.position, history.turn, base.position)
         base.position[0] += history.offset[0]
         base.position[1] += history.offset[1]

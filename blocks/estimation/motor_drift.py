@@ -35,10 +35,10 @@ class DriftParameters(Parameters):
         0.02, unit="ohm", gt=0.0, text="standard deviation of that, before anything is measured"
     )
     voltage_drift: float = parameter(
-        0.05, unit="V/s", ge=0.0, text="by how much the open voltage may change in a second"
+        0.05, unit="V/s", ge=0.0, text="change of the open voltage in a second"
     )
     resistance_drift: float = parameter(
-        0.0005, unit="ohm/s", ge=0.0, text="by how much the resistance may change in a second"
+        0.0005, unit="ohm/s", ge=0.0, text="change of the resistance in a second"
     )
     voltage_noise: float = parameter(
         0.1,
@@ -49,7 +49,7 @@ class DriftParameters(Parameters):
 
 
 class DriftConstants(Signal):
-    """What follows from the robot's description."""
+    """Constants derived from the robot's description."""
 
     joint_to_motor = Field(("n_joints", "n_joints"), text="joint velocities to those of motors")
     torque_to_motor = Field(("n_joints", "n_joints"), text="joint torques to those of motors")
@@ -60,25 +60,25 @@ class DriftConstants(Signal):
 
 
 class DriftScratch(Signal):
-    """Room for a step of ``MotorDrift``."""
+    """Scratch memory of one step of ``MotorDrift``."""
 
     torque = Field("n_joints", unit="N m", text="of the motors, by their nominal constants")
     speed = Field("n_joints", unit="rad/s", text="of the motors")
 
 
 class PackState(Signal):
-    """What is known of the pack: mean and covariance of its two numbers."""
+    """Estimate of the pack: mean and covariance of its two numbers."""
 
     open_voltage = Field(unit="V", text="without load")
     resistance = Field(unit="ohm", text="of pack and leads")
     p_uu = Field(unit="V^2", text="variance of the open voltage")
     p_ur = Field(unit="V ohm", text="covariance of both")
     p_rr = Field(unit="ohm^2", text="variance of the resistance")
-    known = Field(dtype="bool", text="whether a voltage was measured")
+    known = Field(dtype="bool", text="a voltage was measured")
 
 
 class MotorDrift(Block):
-    """What motors and pack are like now, by the temperatures, voltages and torques that the drives report.
+    """The present condition of motors and pack, by the temperatures, voltages and torques that the drives report.
 
     **Windings.** With the temperature T of a winding, magnets lose remanence and copper gains resistance,
     so of a motor's torque constant and of its winding's resistance there are left::
@@ -111,8 +111,8 @@ class MotorDrift(Block):
     health = Input(RobotHealth, text="temperatures and voltages of the drives")
     measured_joints = Input(JointState, text="readings of the joints, torques by nominal constants")
     joints = Output(JointState, text="the same with the torques that the motors give")
-    motors = Output(MotorCondition, text="what the motors are like, and the pack")
-    pack = State(PackState, text="what is known of the pack")
+    motors = Output(MotorCondition, text="condition of the motors and the pack")
+    pack = State(PackState, text="estimate of the pack")
 
     def setup(self) -> None:
         robot, constants, rated = self.robot, self.constants, self.robot.motors
@@ -167,7 +167,7 @@ class MotorDrift(Block):
         motors.pack_resistance = pack.resistance
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The weakest motor, and the pack where a voltage was reported."""
+        """Return the weakest motor, and the pack where a voltage was reported."""
         found: dict[str, Metric] = {
             "least_torque_constant": float(np.min(self.motors.torque_constant))
         }
@@ -179,7 +179,7 @@ class MotorDrift(Block):
 
 @kernel
 def mean_voltage(voltages: Array1D) -> float:
-    """The mean of the voltages that are reported [V]; zero if none is."""
+    """Return the mean of the voltages that are reported [V]; zero if none is."""
     total, count = 0.0, 0
     for k in range(voltages.shape[0]):
         if voltages[k] > 0.0:
@@ -192,7 +192,7 @@ def mean_voltage(voltages: Array1D) -> float:
 def follow_pack(
     voltage: float, current: float, pack: PackState, params: DriftParameters, period: float
 ) -> None:
-    """A step of the Kalman filter: ``voltage`` [V] = open voltage - resistance times ``current`` [A]."""
+    """Make a step of the Kalman filter: ``voltage`` [V] = open voltage - resistance times ``current`` [A]."""
     if not pack.known:
         pack.resistance = params.pack_resistance
         pack.open_voltage = voltage + pack.resistance * current

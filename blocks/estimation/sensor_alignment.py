@@ -21,15 +21,15 @@ SAMPLES = 16
 
 
 class SensorAlignmentParameters(Parameters):
-    """The parameters of ``SensorAlignment``: by how much each reading is older than the tick, where the
-    IMU is, and the play of the gears."""
+    """The parameters of ``SensorAlignment``: the age of each reading at the tick, the place of the IMU, and the play of
+    the gears."""
 
     rate: float = parameter(0.0, unit="s", ge=0.0, le=0.02, text="age of the gyroscope's readings")
     force: float = parameter(0.0, unit="s", ge=0.0, le=0.02, text="age of the accelerometer's")
     position: float = parameter(0.0, unit="s", ge=0.0, le=0.02, text="age of joint angles")
     velocity: float = parameter(0.0, unit="s", ge=0.0, le=0.02, text="age of joint velocities")
     imu_position: ThreeNumbers = parameter(
-        (0.0, 0.0, 0.0), unit="m", text="where the IMU is, from the base's origin, base frame"
+        (0.0, 0.0, 0.0), unit="m", text="place of the IMU, from the base's origin, base frame"
     )
     imu_rotation: ThreeNumbers = parameter(
         (0.0, 0.0, 0.0), unit="rad", text="rotation vector from the base's axes to the IMU's"
@@ -46,23 +46,23 @@ class AlignmentMemory(Signal):
     force = Field((SAMPLES, 3), unit="m/s^2", text="of the accelerometer")
     position = Field((SAMPLES, "n_joints"), unit="rad", text="joint angles")
     velocity = Field((SAMPLES, "n_joints"), unit="rad/s", text="joint velocities")
-    count = Field(dtype="int64", text="how many samples there were")
+    count = Field(dtype="int64", text="number of samples")
     turning = Field(3, unit="rad/s", frame="body", text="angular velocity in the tick before")
-    play = Field("n_joints", unit="rad", text="where in its play each rotor is")
+    play = Field("n_joints", unit="rad", text="place of each rotor in its play")
 
 
 class AlignmentConstants(Signal):
-    """What follows from the parameters."""
+    """Constants derived from the parameters."""
 
     to_base = Field(4, text="quaternion from the IMU's axes to the base's")
-    place = Field(3, unit="m", frame="body", text="where the IMU is")
-    moved = Field(dtype="bool", text="whether the IMU is not at the base's origin with its axes")
+    place = Field(3, unit="m", frame="body", text="place of the IMU")
+    moved = Field(dtype="bool", text="the IMU is not at the base's origin with its axes")
     play = Field("n_joints", unit="rad", text="half the width of each play")
-    has_play = Field(dtype="bool", text="whether there is any play")
+    has_play = Field(dtype="bool", text="there is any play")
 
 
 class AlignmentScratch(Signal):
-    """Room for a step of ``SensorAlignment``."""
+    """Scratch memory of one step of ``SensorAlignment``."""
 
     rate = Field(3, unit="rad/s", frame="body", text="an angular velocity")
     force = Field(3, unit="m/s^2", frame="body", text="a specific force")
@@ -197,7 +197,7 @@ def keep(sample: Array1D, ring: Array2D, count: int) -> None:
 
 @kernel
 def interpolate(ring: Array2D, count: int, late: float, out: Array1D) -> None:
-    """The value ``late`` ticks before the newest sample, between the two samples beside it."""
+    """Interpolate the value ``late`` ticks before the newest sample, between the two samples beside it."""
     slots = ring.shape[0]
     late = min(late, slots - 1.0)
     whole = int(late)

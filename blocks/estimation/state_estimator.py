@@ -36,13 +36,13 @@ from .inertial_estimator import (
 
 
 class GroundTrust(Signal):
-    """How far points and ground are trusted."""
+    """Trust in points and ground."""
 
-    gate = Field(unit="m/s", text="how fast a standing point may seem to move")
-    touched = Field(dtype="bool", text="whether a point has ever had contact")
-    flown = Field(dtype="bool", text="whether all points have lost contact since the start")
-    facing = Field(dtype="bool", text="whether the feet's heading has been noted")
-    heading = Field(unit="rad", frame="world", text="where the feet point while they stand")
+    gate = Field(unit="m/s", text="speed with which a standing point may seem to move")
+    touched = Field(dtype="bool", text="a point has ever had contact")
+    flown = Field(dtype="bool", text="all points have lost contact since the start")
+    facing = Field(dtype="bool", text="the feet's heading has been noted")
+    heading = Field(unit="rad", frame="world", text="direction of the feet while they stand")
     aligned = Field(dtype="int64", text="ticks of alignment with the level ground")
 
 
@@ -89,13 +89,13 @@ class StateEstimator(InertialEstimator):
       lift-off. ``gate`` grows while all points are rejected or in the air, so that the estimate
       recovers from a wrong prediction.
     * While all points are in contact and the robot moves slowly, before the first flight, the feet are flat on level ground.
-      Or it leans as ``slope`` says. Then the heights of the points give the tilt, as exactly as the encoder offsets allow (about
+      Or it leans by ``slope``. Then the heights of the points give the tilt, as exactly as the encoder offsets allow (about
       3 mrad, where a biased accelerometer has 10 mrad), and the feet give the heading while they
       stand. The drift of both, by a least-squares line over up to 250 ticks, gives the gyroscope's
       bias. While the robot stands still before the first flight, the accelerometer's reading minus
       gravity gives its bias, which would cause a drift in flight. After a flight the feet may stand at
-      different heights, so only the accelerometer corrects the tilt, unless ``level_ground`` says that
-      all ground is level.
+      different heights, so only the accelerometer corrects the tilt, unless all ground is
+      level by ``level_ground``.
 
     **Flight.** While no point is trusted there is only the prediction. ``flight: imu`` integrates
     the IMU. ``flight: ballistic`` averages the CoM's velocity by the IMU over the first 20 ms; from
@@ -112,7 +112,7 @@ class StateEstimator(InertialEstimator):
     Params = StateEstimatorParameters
     starts_level = True
     params: StateEstimatorParameters
-    trust = State(GroundTrust, text="how far points and ground are trusted")
+    trust = State(GroundTrust, text="trust in points and ground")
 
     @kernel
     @staticmethod

@@ -18,11 +18,11 @@ class CommandMemory(Signal):
     """The state of ``StatePredictor``."""
 
     acceleration = Field((COMMANDS, "n_velocities"), text="of the last commands, newest first")
-    loaded = Field(COMMANDS, dtype="bool", text="whether a point was in stance in these ticks")
+    loaded = Field(COMMANDS, dtype="bool", text="a point was in stance in these ticks")
 
 
 class StatePredictorScratch(Signal):
-    """What a tick of ``StatePredictor`` computes on its way."""
+    """Intermediate values of a tick of ``StatePredictor``."""
 
     fall = Field(3, unit="m/s^2", frame="body", text="acceleration of the base in free fall")
     velocity_change = Field("n_velocities", text="change of the velocity within ``ahead``")
@@ -58,7 +58,7 @@ class StatePredictor(Block):
     measured_joints = Input(JointState, text="joint angles and velocities")
     command = Input(WholeBodyCommand, text="the last whole-body command")
     phase = Input(PhaseState, text="the phase and the points in stance of that command")
-    delay = Input(DelayEstimate, text="the delay, and how far ahead to predict")
+    delay = Input(DelayEstimate, text="the delay, and the time to predict ahead")
     base = Output(BaseState, text="the base when the command takes effect")
     joints = Output(JointState, text="the joints then; torques as measured")
     memory = State(CommandMemory, text="the commands on their way")
@@ -98,7 +98,7 @@ def remember_command(command: WholeBodyCommand, phase: PhaseState, memory: Comma
 
 @kernel
 def fall_freely(base: BaseState, scratch: StatePredictorScratch) -> None:
-    """The rate of the base's velocity in its own axes in free fall: R' g - w x (R' v)."""
+    """Compute the rate of the base's velocity in its own axes in free fall: R' g - w x (R' v)."""
     fall, velocity = scratch.fall, scratch.vector
     fall[0], fall[1], fall[2] = 0.0, 0.0, -GRAVITY
     rotate_back(base.orientation, fall, fall)
@@ -114,7 +114,7 @@ def add_commands(
     memory: CommandMemory,
     scratch: StatePredictorScratch,
 ) -> None:
-    """The changes of velocity and position within ``ahead`` by the commands that act then.
+    """Compute the changes of velocity and position within ``ahead`` by the commands that act then.
 
     The command that is i + 1 ticks old acts from delay - (i + 1) period on, for a period.
     """

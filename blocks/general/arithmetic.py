@@ -38,7 +38,7 @@ class Gain(UnitOfProduct, Block):
         gain: ScalarOrVector = live_parameter(1.0, text="the factor")
 
     params: Params
-    u = Input(Vector, text="what is scaled")
+    u = Input(Vector, text="the vector to scale")
     y = Output(Vector, text="gain times u")
 
     @kernel
@@ -79,7 +79,7 @@ class Product(Block):
     """
 
     class Params(VectorParameters):
-        operation: Literal["multiply", "divide"] = parameter("multiply", text="what is done")
+        operation: Literal["multiply", "divide"] = parameter("multiply", text="the operation")
 
     params: Params
     a = Input(Vector, text="the first factor, or the dividend")
@@ -88,7 +88,7 @@ class Product(Block):
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """The product or quotient of the units; a frame is kept."""
+        """Return the product or quotient of the units; a frame is kept."""
         assert isinstance(params, cls.Params)
         a, b = inputs["a"], inputs["b"]
         if a is None or b is None:
@@ -125,7 +125,7 @@ class MatrixGain(Block):
         _rows = matrix_rows("matrix")
 
     params: Params
-    u = Input(Vector, text="what is multiplied")
+    u = Input(Vector, text="the vector to multiply")
     y = Output(Rows, text="K u")
 
     @classmethod
@@ -141,7 +141,7 @@ class MatrixGain(Block):
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """The unit of u times that of the matrix; the frame is what the parameter says."""
+        """Return the unit of u times that of the matrix; the frame is that of the parameter."""
         assert isinstance(params, cls.Params)
         u = inputs["u"]
         return {"y": u and replace(u.times(read_unit(params.unit)), frame=params.frame)}

@@ -21,18 +21,18 @@ class FilterState(Signal):
     """The memory of a second-order filter in transposed direct form II."""
 
     memory = Field(("n", 2), text="two numbers for each element")
-    started = Field((), dtype="bool", text="whether there was an input")
+    started = Field((), dtype="bool", text="there was an input")
 
 
 class LinearFilter(UnitOfInput, Block):
-    """The base of the filters: ``prepare`` says which filter it is."""
+    """The base of the filters: ``prepare`` designs the filter."""
 
     class Constants(Signal):
         """The filter."""
 
         coefficients = Field(5, text="b0, b1, b2, a1 and a2")
 
-    u = Input(Vector, text="what is filtered")
+    u = Input(Vector, text="the signal to filter")
     y = Output(Vector, text="u, filtered")
     x = State(FilterState, text="the filter's memory")
 
@@ -50,7 +50,7 @@ class LinearFilter(UnitOfInput, Block):
 
 
 def too_fast(name: str, frequency: float, period: float) -> list[UnmetRequirement]:
-    """The unmet requirement where a frequency [Hz] is not below half of the rate at which the block runs."""
+    """Report a frequency [Hz] that is not below half of the rate at which the block runs."""
     if frequency < 0.5 / period:
         return []
     return [
@@ -66,7 +66,7 @@ def too_fast(name: str, frequency: float, period: float) -> list[UnmetRequiremen
 class ButterworthParameters(VectorParameters):
     """A cutoff and an order."""
 
-    cutoff: float = parameter(unit="Hz", gt=0.0, text="where the gain is 1 / sqrt(2)")
+    cutoff: float = parameter(unit="Hz", gt=0.0, text="frequency of the gain 1 / sqrt(2)")
     order: Literal[1, 2] = parameter(
         1, text="beyond the cutoff the gain falls by 20 dB a decade with 1, by 40 dB with 2"
     )
@@ -83,13 +83,13 @@ class Butterworth(LinearFilter):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """The cutoff must be below half of the block's rate."""
+        """Report a cutoff that is not below half of the block's rate."""
         assert isinstance(params, ButterworthParameters)
         return too_fast("cutoff", params.cutoff, context.period)
 
     @classmethod
     def example_parameters(cls) -> dict[str, object]:
-        """A cutoff far below the rate."""
+        """Return a cutoff far below the rate."""
         return {"cutoff": 20.0, "n": 2, "order": 2}
 
     @abstractmethod
@@ -137,19 +137,19 @@ class BandStop(LinearFilter):
 
     class Params(VectorParameters):
         centre: float = parameter(unit="Hz", gt=0.0, text="the frequency that is taken out")
-        width: float = parameter(1.0, unit="Hz", gt=0.0, text="how broad the notch is")
+        width: float = parameter(1.0, unit="Hz", gt=0.0, text="width of the notch")
 
     params: Params
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """The centre must be below half of the block's rate."""
+        """Report a centre that is not below half of the block's rate."""
         assert isinstance(params, cls.Params)
         return too_fast("centre", params.centre, context.period)
 
     @classmethod
     def example_parameters(cls) -> dict[str, object]:
-        """A centre far below the rate."""
+        """Return a centre far below the rate."""
         return {"centre": 50.0, "n": 2}
 
     def prepare(self) -> None:
@@ -161,7 +161,7 @@ class RecentInputs(Signal):
     """The last inputs."""
 
     values = Field(("samples", "n"), text="the last inputs, each in the place of its turn")
-    count = Field((), dtype="int64", text="how many inputs there were")
+    count = Field((), dtype="int64", text="number of inputs so far")
 
 
 class MovingAverage(UnitOfInput, Block):
@@ -172,10 +172,10 @@ class MovingAverage(UnitOfInput, Block):
     """
 
     class Params(VectorParameters):
-        samples: int = parameter(10, ge=1, text="k, how many inputs are averaged")
+        samples: int = parameter(10, ge=1, text="k, the number of inputs that are averaged")
 
     params: Params
-    u = Input(Vector, text="what is averaged")
+    u = Input(Vector, text="the signal to average")
     y = Output(Vector, text="the mean")
     x = State(RecentInputs, text="the last inputs")
 
@@ -191,11 +191,11 @@ class MovingAverage(UnitOfInput, Block):
 
 
 class DerivativeState(Signal):
-    """What a filtered derivative remembers."""
+    """Memory of a filtered derivative."""
 
     value = Field("n", text="the input before")
     rate = Field("n", text="the derivative before")
-    started = Field((), dtype="bool", text="whether there was an input")
+    started = Field((), dtype="bool", text="there was an input")
 
 
 class FilteredDerivative(Block):
@@ -216,13 +216,13 @@ class FilteredDerivative(Block):
         gain = Field(unit="1/s", text="1 / (tau + T)")
 
     params: Params
-    u = Input(Vector, text="what is differentiated")
+    u = Input(Vector, text="the signal to differentiate")
     y = Output(Vector, text="its rate per second")
     x = State(DerivativeState, text="the input and the derivative before")
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """The unit of the input by a second."""
+        """Return the unit of the input by a second."""
         u = inputs["u"]
         return {"y": u and u.times(SECOND, -1)}
 

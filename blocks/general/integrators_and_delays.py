@@ -34,13 +34,13 @@ class Integrator(Bounded, Block):
 
     params: Params
     u = Input(Vector, text="the rate")
-    reset = Input(Flag, text="whether to start anew from the initial value", default=NEVER)
+    reset = Input(Flag, text="starts anew from the initial value", default=NEVER)
     y = Output(Vector, text="its integral")
     x = State(Vector, text="the integral")
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """The unit of the rate times a second."""
+        """Return the unit of the rate times a second."""
         u = inputs["u"]
         return {"y": u and u.times(SECOND)}
 
@@ -65,11 +65,11 @@ class Integrator(Bounded, Block):
 
 
 class TrapezoidalState(Signal):
-    """What the trapezoidal integrator remembers."""
+    """Memory of the trapezoidal integrator."""
 
     integral = Field("n", text="the integral so far")
     rate = Field("n", text="the input before")
-    started = Field((), dtype="bool", text="whether there was an input since the start or a reset")
+    started = Field((), dtype="bool", text="there was an input since the start or a reset")
 
 
 class TrapezoidalIntegrator(Block):
@@ -82,13 +82,13 @@ class TrapezoidalIntegrator(Block):
     Params = InitialValueParameters
     params: InitialValueParameters
     u = Input(Vector, text="the rate")
-    reset = Input(Flag, text="whether to start anew from the initial value", default=NEVER)
+    reset = Input(Flag, text="starts anew from the initial value", default=NEVER)
     y = Output(Vector, text="its integral")
     x = State(TrapezoidalState, text="the integral and the rate before")
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """The unit of the rate times a second."""
+        """Return the unit of the rate times a second."""
         u = inputs["u"]
         return {"y": u and u.times(SECOND)}
 
@@ -119,7 +119,7 @@ class UnitDelay(UnitOfInput, Block):
 
     Params = InitialValueParameters
     params: InitialValueParameters
-    u = Input(Vector, text="what is delayed")
+    u = Input(Vector, text="the signal to delay")
     y = Output(Vector, text="u one run ago")
     x = State(Vector, text="u of the last run")
 
@@ -153,10 +153,10 @@ class Delay(UnitOfInput, Block):
     """
 
     class Params(InitialValueParameters):
-        samples: int = parameter(1, ge=1, text="k, by how many runs of the block")
+        samples: int = parameter(1, ge=1, text="k, the delay in runs of the block")
 
     params: Params
-    u = Input(Vector, text="what is delayed")
+    u = Input(Vector, text="the signal to delay")
     y = Output(Vector, text="u, k runs ago")
     x = State(DelayLine, text="the last k inputs")
 
@@ -183,8 +183,8 @@ class SampleHold(UnitOfInput, Block):
 
     Params = InitialValueParameters
     params: InitialValueParameters
-    u = Input(Vector, text="what is sampled")
-    trigger = Input(Flag, text="whether to sample")
+    u = Input(Vector, text="the signal to sample")
+    trigger = Input(Flag, text="takes a sample")
     y = Output(Vector, text="the last sample")
     x = State(Vector, text="the last sample")
 
@@ -217,7 +217,7 @@ class ZeroOrderHold(UnitOfInput, Block):
         samples: int = parameter(2, ge=1, text="k, from one sample to the next in runs")
 
     params: Params
-    u = Input(Vector, text="what is sampled")
+    u = Input(Vector, text="the signal to sample")
     y = Output(Vector, text="the last sample")
     x = State(HeldSample, text="the last sample")
 

@@ -10,9 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...clib.library import Library as Instance
+from ...clib.library import SharedLibrary as Instance
 from ...clib.library import description_in, read_description
-from ...clib.remote_library import RemoteLibrary
+from ...clib.remote_library import RemoteSharedLibrary
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.errors import AloftError, BlockError
@@ -20,7 +20,7 @@ from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal, signal_of
 
 
-class LibraryState(Signal):
+class CLibraryState(Signal):
     """The state of a library."""
 
     steps = Field(dtype="int64", text="the steps that were made")
@@ -29,8 +29,8 @@ class LibraryState(Signal):
     )
 
 
-class LibraryParameters(Parameters):
-    """Which library to run, and how."""
+class CLibraryParameters(Parameters):
+    """The library to run, and the way to run it."""
 
     folder: str = parameter(
         text="the folder that aloft export c has written, relative to that of the graph"
@@ -43,21 +43,21 @@ class LibraryParameters(Parameters):
     )
 
 
-class LibraryBlock(Block):
+class CLibraryBlock(Block):
     """A block whose ports are those of a library."""
 
-    Params = LibraryParameters
-    params: LibraryParameters
-    state = State(LibraryState, text="what the library remembers")
+    Params = CLibraryParameters
+    params: CLibraryParameters
+    state = State(CLibraryState, text="state of the library")
     about: ClassVar[Mapping[str, Any]] = {}
-    """What the library's description says."""
+    """The content of the library's description."""
 
     files_folder = "folder"
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a library that cannot run here, or not at this rate."""
-        assert isinstance(params, LibraryParameters)
+        assert isinstance(params, CLibraryParameters)
         try:
             about = _read(params, context.folder)
         except AloftError as error:
@@ -85,16 +85,16 @@ class LibraryBlock(Block):
     def state_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
-        """The numbers that hold the library's state."""
+        """Return the size of the library's state, in numbers of 8 bytes."""
         return {"library_state": -(-int(cls.about["state_bytes"]) // 8)}
 
     def setup(self) -> None:
         """Make an instance of the library, and bind its terminals to the ports."""
         description = description_in(self.context.folder / self.params.folder)
         self.files_read = (description, description.with_name(f"lib{self.about['name']}.so"))
-        self._instance: Instance | RemoteLibrary
+        self._instance: Instance | RemoteSharedLibrary
         if self.params.memory:
-            self._instance = RemoteLibrary(self.about, Path(self.params.memory))
+            self._instance = RemoteSharedLibrary(self.about, Path(self.params.memory))
         else:
             self._instance = Instance(description)
             for name, value in self.params.live.items():
@@ -107,7 +107,7 @@ class LibraryBlock(Block):
     def _pairs(
         self, kind: str, views: Mapping[str, NDArray[Any]]
     ) -> list[tuple[NDArray[Any], NDArray[Any]]]:
-        """The field of a port and the terminal of the library that belong together."""
+        """Return the pairs of a port's field and the library's terminal that belong together."""
         return [
             (getattr(self, port).views()[each["field"]], views[each["name"]])
             for port, fields in _ports(self.about)[kind].items()
@@ -137,14 +137,14 @@ class LibraryBlock(Block):
 
     def save_state(self) -> None:
         """Write the library's state into the block's own."""
-        if isinstance(self._instance, RemoteLibrary):
+        if isinstance(self._instance, RemoteSharedLibrary):
             return
         kept = np.frombuffer(self._instance.save(), np.uint8)
         self.state.data.view(np.uint8)[: kept.size] = kept
 
     def load_state(self) -> None:
         """Give the library its state back."""
-        if isinstance(self._instance, RemoteLibrary):
+        if isinstance(self._instance, RemoteSharedLibrary):
             if self.state.steps[()]:
                 raise BlockError(
                     f"the state of {self.about['name']} is in the process that shares {self.params.memory}: "
@@ -155,13 +155,13 @@ class LibraryBlock(Block):
         self._instance.restore(self.state.data.view(np.uint8)[:size].tobytes())
 
     def warnings(self) -> Sequence[str]:
-        """What the library asked for, and how often."""
+        """Return the codes with which the library asked for attention, and the number of ticks."""
         return [
             f"{self.about['name']} returned {key} in {n} ticks" for key, n in self._asked.items()
         ]
 
 
-class Library(LibraryBlock):
+class CLibrary(CLibraryBlock):
     """Runs a library of C that ``aloft export c`` has written, in place of the blocks that it was made of.
 
     The ports follow from its description ``NAME.json``, with shapes, units and frames: a terminal
@@ -173,7 +173,7 @@ class Library(LibraryBlock):
 
     Loading compares the shared library with its digest in the description. Both travel in the recording, and
     a snapshot has the library's state. Where a block of the library asks for attention, the run goes on, and its
-    end says how often; see the codes in docs/c_library.md.
+    end reports how often; see the codes in docs/c_library.md.
 
     With ``memory`` the library runs in a process of its own, the program ``main`` that was exported with it:
     in lockstep the bytes are the same; in real time the block gives the newest inputs and takes the newest outputs.
@@ -193,8 +193,8 @@ class Library(LibraryBlock):
         robot: RobotDescription | None = None,
         graph_folder: Path | None = None,
     ) -> type[Block]:
-        """The class with the ports of the library."""
-        assert isinstance(params, LibraryParameters)
+        """Make the class with the ports of the library."""
+        assert isinstance(params, CLibraryParameters)
         try:
             return _class_for(_read(params, folder), remote=bool(params.memory))
         except AloftError as error:
@@ -202,7 +202,7 @@ class Library(LibraryBlock):
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """A library has to be written first, for this computer."""
+        """Return the folder of a library, which has to be written first, for this computer."""
         return {"folder": "controller"}
 
     def step(self) -> None:
@@ -213,7 +213,7 @@ class Library(LibraryBlock):
         self.state.steps[()] += 1
 
 
-class _WithoutFeedthrough(LibraryBlock):
+class _WithoutFeedthrough(CLibraryBlock):
     """A library whose outputs do not depend on its inputs at once."""
 
     _instance: Instance
@@ -232,12 +232,12 @@ class _WithoutFeedthrough(LibraryBlock):
         self.state.steps[()] += 1
 
 
-def _read(params: LibraryParameters, folder: Path) -> Mapping[str, Any]:
+def _read(params: CLibraryParameters, folder: Path) -> Mapping[str, Any]:
     return read_description(description_in(folder / params.folder))
 
 
 def _ports(about: Mapping[str, Any]) -> dict[str, dict[str, list[Mapping[str, Any]]]]:
-    """The terminals of inputs and of outputs by the names of their ports."""
+    """Return the terminals of inputs and of outputs by the names of their ports."""
     found: dict[str, dict[str, list[Mapping[str, Any]]]] = {"outputs": {}, "inputs": {}}
     for kind, ports in found.items():
         for each in about[kind]:
@@ -252,17 +252,17 @@ _CLASSES: dict[str, type[Block]] = {}
 
 
 def _class_for(about: Mapping[str, Any], *, remote: bool) -> type[Block]:
-    """The class of a library; the same one for the same library, so that graphs compare equal."""
+    """Return the class of a library; the same one for the same library, so that graphs compare equal."""
     key = repr((about, remote))
     if key not in _CLASSES:
         direct = remote or any(each["depends"] for each in about["outputs"])
-        base: Any = Library if direct else _WithoutFeedthrough
-        body: dict[str, Any] = {"__doc__": Library.__doc__, "__module__": Library.__module__}
+        base: Any = CLibrary if direct else _WithoutFeedthrough
+        body: dict[str, Any] = {"__doc__": CLibrary.__doc__, "__module__": CLibrary.__module__}
         for kind, ports in _ports(about).items():
             for name, fields in ports.items():
                 signal = signal_of("OfLibrary", {each["field"]: each for each in fields})
                 text = "; ".join(each["text"] for each in fields[:3])
                 body[name] = (Input if kind == "inputs" else Output)(signal, text=text)
-        body["about"], body["specialize"] = about, vars(Library)["specialize"]
+        body["about"], body["specialize"] = about, vars(CLibrary)["specialize"]
         _CLASSES[key] = type("Library", (base,), body)
     return _CLASSES[key]

@@ -53,13 +53,13 @@ class SystemParameters(SourceParameters):
     initial: list[float] | None = parameter(None, text="the state at the start; else zero")
     time: Literal["discrete", "continuous"] = parameter(
         "discrete",
-        text="whether A and B give the next state, or its rate: then they are discretised exactly",
+        text="A and B give the next state (discrete), or its rate (continuous): then they are discretised exactly",
     )
 
     _rows = matrix_rows("a", "b", "c")
 
     def sizes(self) -> Mapping[str, int]:
-        """The dimensions ``n`` (inputs), ``m`` (outputs) and ``order``."""
+        """Return the dimensions ``n`` (inputs), ``m`` (outputs) and ``order``."""
         return {"n": len(self.b[0]), "m": len(self.c), "order": len(self.a)}
 
     def wrong_sizes(self) -> Iterable[UnmetRequirement]:
@@ -72,7 +72,7 @@ class SystemParameters(SourceParameters):
             yield from _unequal("initial", "elements", len(self.initial), order)
 
     def matrices(self, period: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The discrete A and B of a period [s]."""
+        """Return the discrete A and B of a period [s]."""
         if self.time == "discrete":
             return np.array(self.a), np.array(self.b)
         return discretise(self.a, self.b, period)
@@ -86,7 +86,7 @@ class DiscreteSystem(Signal):
 
 
 class NextState(Signal):
-    """Room for the next state."""
+    """Scratch memory of the next state."""
 
     next = Field("order", text="the next state")
 
@@ -119,13 +119,13 @@ class LinearSystem(UnitFromParameters, Block):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """The matrices must fit each other."""
+        """Report matrices that do not fit each other."""
         assert isinstance(params, SystemParameters)
         return params.wrong_sizes()
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """A damped oscillator with two inputs and one output."""
+        """Return a damped oscillator with two inputs and one output."""
         return {
             "a": [[0.0, 1.0], [-4.0, -0.5]],
             "b": [[0.0, 1.0], [1.0, 0.0]],
@@ -190,7 +190,7 @@ class StateSpaceWithFeedthrough(LinearSystem):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """The matrices must fit each other."""
+        """Report matrices that do not fit each other."""
         assert isinstance(params, cls.Params)
         yield from params.wrong_sizes()
         found = f"{len(params.d)} x {len(params.d[0])}"
@@ -200,7 +200,7 @@ class StateSpaceWithFeedthrough(LinearSystem):
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """An oscillator with feedthrough."""
+        """Return an oscillator with feedthrough."""
         return {**super().example_parameters(), "d": [[0.5, -1.0]]}
 
     @kernel
@@ -237,7 +237,7 @@ class TransferFunction(UnitOfProduct, Block):
         numerator: list[float] = parameter(text="coefficients of falling powers", min_length=1)
         denominator: list[float] = parameter(text="coefficients of falling powers", min_length=2)
         time: Literal["continuous", "discrete"] = parameter(
-            "continuous", text="whether it is a function of s or of z"
+            "continuous", text="variable of the function: s or z"
         )
 
     class Constants(Signal):
@@ -250,7 +250,7 @@ class TransferFunction(UnitOfProduct, Block):
 
     Scratch = NextState
     params: Params
-    u = Input(Vector, text="what is filtered")
+    u = Input(Vector, text="the signal to filter")
     y = Output(Vector, text="u, filtered")
     x = State(TransferState, text="the states")
 
@@ -262,7 +262,7 @@ class TransferFunction(UnitOfProduct, Block):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """It must be proper, and its denominator have the degree it seems to have."""
+        """Report a function that is not proper, or a denominator without the degree it seems to have."""
         assert isinstance(params, cls.Params)
         if params.denominator[0] == 0.0:
             yield UnmetRequirement("the denominator's first coefficient is zero", "denominator")
@@ -276,7 +276,7 @@ class TransferFunction(UnitOfProduct, Block):
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """A damped second-order system with feedthrough."""
+        """Return a damped second-order system with feedthrough."""
         return {"n": 2, "numerator": [0.1, 1.0, 4.0], "denominator": [1.0, 2.0, 4.0]}
 
     def prepare(self) -> None:

@@ -29,7 +29,7 @@ class Logic(Block):
 
     class Params(VectorParameters):
         operation: Literal["and", "or", "xor", "nand", "nor"] = parameter(
-            "and", text="what is done"
+            "and", text="the operation"
         )
 
     params: Params
@@ -74,7 +74,7 @@ class Compare(Block):
     params: Params
     a = Input(Vector, text="the left side")
     b = Input(Vector, text="the right side")
-    y = Output(Flags, text="where it holds")
+    y = Output(Flags, text="elements for which it holds")
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
@@ -120,11 +120,11 @@ class FlagsBefore(Signal):
     """The truth values of the run before."""
 
     value = Field("n", dtype="bool", text="the truth values")
-    started = Field((), dtype="bool", text="whether there was a run before")
+    started = Field((), dtype="bool", text="there was a run before")
 
 
 class EdgeDetector(Block):
-    """Where an element began to hold in this run (rising), ceased to (falling), or either.
+    """Marks the elements that began to hold in this run (rising), ceased to (falling), or either.
 
     The first run has no edge.
     """
@@ -134,7 +134,7 @@ class EdgeDetector(Block):
 
     params: Params
     u = Input(Flags, text="the truth values")
-    y = Output(Flags, text="which elements changed in this run")
+    y = Output(Flags, text="elements that changed in this run")
     x = State(FlagsBefore, text="the truth values of the run before")
 
     @kernel
@@ -158,7 +158,7 @@ _ENDLESS = 2**62
 
 
 class Counter(Block):
-    """In how many runs ``u`` held so far, this one included; from 0 again behind ``last``.
+    """Counts the runs in which ``u`` held so far, this one included; from 0 again behind ``last``.
 
     Where ``reset`` holds the count is 0, whatever ``u`` is. To count how often something begins to
     hold put an ``EdgeDetector`` before it.
@@ -170,13 +170,13 @@ class Counter(Block):
         )
 
     class Constants(Signal):
-        """What follows from the parameters."""
+        """Constants derived from the parameters."""
 
         last = Field(dtype="int64", text="the greatest count")
 
     params: Params
-    u = Input(Flag, text="what is counted")
-    reset = Input(Flag, text="whether to begin at 0 again", default=NEVER)
+    u = Input(Flag, text="the condition to count")
+    reset = Input(Flag, text="begins at 0 again", default=NEVER)
     y = Output(Number, text="the count")
     x = State(CountState, text="the count")
 
@@ -194,21 +194,21 @@ class Counter(Block):
 
 
 class Timer(Block):
-    """For how long ``u`` has held without a break: 0 in the first run in which it holds.
+    """Measures the time for which ``u`` has held without a break: 0 in the first run in which it holds.
 
-    ``done`` says whether u holds and that is at least ``duration``. Time is counted in whole runs,
+    ``done`` is true when u holds and that is at least ``duration``. Time is counted in whole runs,
     so it has no error of rounding that grows.
     """
 
     class Params(Parameters):
         duration: float = live_parameter(
-            1.0, unit="s", ge=0.0, text="how long it must hold to be done"
+            1.0, unit="s", ge=0.0, text="time for which it must hold to be done"
         )
 
     params: Params
-    u = Input(Flag, text="what must hold")
-    elapsed = Output(Seconds, text="for how long it has held; 0 where it does not")
-    done = Output(Flag, text="whether it has held long enough")
+    u = Input(Flag, text="the condition to time")
+    elapsed = Output(Seconds, text="time for which it has held; 0 where it does not")
+    done = Output(Flag, text="it has held long enough")
     x = State(CountState, text="runs in which it has held")
 
     @kernel
@@ -226,7 +226,7 @@ class Switch(Block):
 
     Params = VectorParameters
     params: VectorParameters
-    condition = Input(Flag, text="whether a is taken")
+    condition = Input(Flag, text="takes a")
     a = Input(Vector, text="taken where the condition holds")
     b = Input(Vector, text="taken where it does not")
     y = Output(Vector, text="the one that is taken")

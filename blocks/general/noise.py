@@ -73,7 +73,7 @@ class NoiseState(StreamState):
     """A random stream, and the noise it has made."""
 
     value = Field("n", text="the noise in units of its deviation")
-    started = Field((), dtype="bool", text="whether there was a run")
+    started = Field((), dtype="bool", text="there was a run")
 
 
 class ColouredNoise(UnitFromParameters, Block):
@@ -95,16 +95,16 @@ class ColouredNoise(UnitFromParameters, Block):
         seed: int = parameter(0, ge=0, text="of the random stream")
 
     class Constants(Signal):
-        """What follows from the parameters."""
+        """Constants derived from the parameters."""
 
         decay = Field(text="f")
         share = Field(text="sqrt(1 - f^2)")
         std = Field("n", text="standard deviation")
 
     class Scratch(Signal):
-        """Room for a step."""
+        """Scratch memory of one step."""
 
-        sample = Field("n", text="what was drawn")
+        sample = Field("n", text="the drawn numbers")
 
     params: Params
     y = Output(Vector, text="the noise")

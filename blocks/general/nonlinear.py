@@ -33,7 +33,7 @@ class Saturation(Bounded, UnitOfInput, Block):
         upper: ScalarOrVector | None = live_parameter(None, text="the greatest output")
 
     params: Params
-    u = Input(Vector, text="what is bounded")
+    u = Input(Vector, text="the signal to bound")
     y = Output(Vector, text="u within the bounds")
 
     @kernel
@@ -46,12 +46,12 @@ class DeadZone(Bounded, UnitOfInput, Block):
     """Nothing within a zone, and what goes beyond it outside: y = u - min(max(u, lower), upper)."""
 
     class Params(VectorParameters):
-        lower: ScalarOrVector = live_parameter(-0.5, text="where the zone begins")
-        upper: ScalarOrVector = live_parameter(0.5, text="where the zone ends")
+        lower: ScalarOrVector = live_parameter(-0.5, text="begin of the zone")
+        upper: ScalarOrVector = live_parameter(0.5, text="end of the zone")
 
     params: Params
-    u = Input(Vector, text="what is passed on outside the zone")
-    y = Output(Vector, text="how far u is beyond the zone")
+    u = Input(Vector, text="the signal that is passed on outside the zone")
+    y = Output(Vector, text="distance of u beyond the zone")
 
     @kernel
     @staticmethod
@@ -86,7 +86,7 @@ class Quantiser(UnitOfInput, Block):
         interval: float = live_parameter(0.5, gt=0.0, text="from one output value to the next")
 
     params: Params
-    u = Input(Vector, text="what is rounded")
+    u = Input(Vector, text="the signal to round")
     y = Output(Vector, text="the rounded vector")
 
     @kernel
@@ -98,10 +98,10 @@ class Quantiser(UnitOfInput, Block):
 
 
 class LastOutput(Signal):
-    """What a block that starts at its first input remembers."""
+    """Memory of a block that starts at its first input."""
 
     value = Field("n", text="the last output")
-    started = Field((), dtype="bool", text="whether there was one")
+    started = Field((), dtype="bool", text="there was one")
 
 
 class RateLimiter(UnitOfInput, Block):
@@ -116,8 +116,8 @@ class RateLimiter(UnitOfInput, Block):
         falling: ScalarOrVector = live_parameter(1.0, text="the fastest fall per second, positive")
 
     params: Params
-    u = Input(Vector, text="what is followed")
-    y = Output(Vector, text="what follows it")
+    u = Input(Vector, text="the signal to follow")
+    y = Output(Vector, text="the signal that follows it")
     x = State(LastOutput, text="the output before")
 
     @kernel
@@ -153,14 +153,14 @@ class Relay(UnitFromParameters, Block):
         off_value: float = live_parameter(0.0, text="the output when off")
 
     params: Params
-    u = Input(Vector, text="what switches")
+    u = Input(Vector, text="the signal that switches")
     y = Output(Vector, text="on_value or off_value")
-    on = Output(Flags, text="which elements are on")
-    x = State(Flags, text="which elements are on")
+    on = Output(Flags, text="elements that are on")
+    x = State(Flags, text="elements that are on")
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """It must switch off below where it switches on."""
+        """Report a block that does not switch off below where it switches on."""
         assert isinstance(params, cls.Params)
         if params.switch_off > params.switch_on:
             yield UnmetRequirement(

@@ -20,12 +20,12 @@ from .vectors import (
 
 
 class PidState(Signal):
-    """What a PID controller remembers."""
+    """Memory of a PID controller."""
 
     integral = Field("n", text="the integral part")
     derivative = Field("n", text="the derivative part")
     before = Field("n", text="c r - y of the run before")
-    started = Field((), dtype="bool", text="whether there was a run since the start or a reset")
+    started = Field((), dtype="bool", text="there was a run since the start or a reset")
 
 
 class PID(Bounded, Block):
@@ -58,7 +58,7 @@ class PID(Bounded, Block):
             0.01, unit="s", ge=0.0, text="tau, of the derivative's filter"
         )
         tracking_time: float = live_parameter(
-            0.1, unit="s", gt=0.0, text="how fast the integral gives way to a bound"
+            0.1, unit="s", gt=0.0, text="time constant with which the integral gives way to a bound"
         )
         lower: ScalarOrVector | None = live_parameter(None, text="the least output")
         upper: ScalarOrVector | None = live_parameter(None, text="the greatest output")
@@ -74,7 +74,7 @@ class PID(Bounded, Block):
     setpoint = Input(Vector, text="r, what is wanted")
     measured = Input(Vector, text="y, what is")
     feedforward = Input(Vector, text="f, added before the bounds", default={"value": 0.0})
-    reset = Input(Flag, text="whether to forget what was", default=NEVER)
+    reset = Input(Flag, text="forgets the past", default=NEVER)
     u = Output(Vector, text="the control, within the bounds")
     x = State(PidState, text="the integral and the derivative")
 

@@ -21,19 +21,19 @@ _DTYPES = {"tensor(float)": np.float32, "tensor(double)": np.float64}
 
 
 class Observation(Signal):
-    """What a policy sees: ``n`` numbers of any units."""
+    """Observation of a policy: ``n`` numbers of any units."""
 
     value = Field("n", inferred=True, text="the observation's elements, in the network's order")
 
 
 class Action(Signal):
-    """What a policy answers: ``m`` numbers."""
+    """Action of a policy: ``m`` numbers."""
 
     value = Field("m", inferred=True, text="the action's elements, in the network's order")
 
 
 class NetworkState(Signal):
-    """What a recurrent network remembers."""
+    """Memory of a recurrent network."""
 
     value = Field("size", text="all of its states, one after the other")
 
@@ -66,13 +66,13 @@ class Policy(UnitFromParameters, Block):
         size: int = parameter(1, ge=1, text="elements of all states together")
 
     params: Params
-    u = Input(Observation, text="what the policy sees")
-    y = Output(Action, text="what it answers")
+    u = Input(Observation, text="observation of the policy")
+    y = Output(Action, text="action of the policy")
     memory = State(NetworkState, text="the states of a recurrent network")
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """The file must be a network with these inputs and outputs."""
+        """Report a file that is no network with these inputs and outputs."""
         assert isinstance(params, cls.Params)
         try:
             Network(params, context.folder)
@@ -81,7 +81,7 @@ class Policy(UnitFromParameters, Block):
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """The network beside this file."""
+        """Return the network beside this file."""
         return {"file": str(EXAMPLE), "n": 2, "m": 1}
 
     def setup(self) -> None:
@@ -176,7 +176,7 @@ class Network:
 
 
 def _session(path: Path, shown: str) -> Any:
-    """The network, to be run in one thread. Raises ``ValueError``."""
+    """Open the network, to be run in one thread. Raises ``ValueError``."""
     try:
         import onnxruntime
     except ImportError:

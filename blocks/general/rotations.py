@@ -49,7 +49,7 @@ class Vector3(Signal):
 
 
 def random_unit(rng: np.random.Generator) -> Mapping[str, Any]:
-    """A random unit quaternion, for the conformance suite."""
+    """Return a random unit quaternion, for the conformance suite."""
     value = rng.normal(size=4)
     return {"value": value / np.sqrt(np.sum(value * value))}
 
@@ -61,7 +61,7 @@ class QuaternionInput:
     def example_inputs(
         cls, rng: np.random.Generator, dimensions: Mapping[str, int]
     ) -> Mapping[str, Mapping[str, Any]]:
-        """A unit quaternion."""
+        """Return a unit quaternion."""
         return {"u": random_unit(rng)}
 
 
@@ -82,12 +82,12 @@ class RotateVector(Block):
     def example_inputs(
         cls, rng: np.random.Generator, dimensions: Mapping[str, int]
     ) -> Mapping[str, Mapping[str, Any]]:
-        """A unit quaternion."""
+        """Return a unit quaternion."""
         return {"rotation": random_unit(rng)}
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """The vector must be in the first frame; the result is in the second."""
+        """Check that the vector is in the first frame; the result is in the second."""
         assert isinstance(params, cls.Params)
         before, _, after = params.direction.split()
         u = inputs["u"]
@@ -112,10 +112,10 @@ class QuaternionProduct(Block):
     """
 
     class Params(Parameters):
-        inverse: bool = parameter(False, text="whether a is inverted")
+        inverse: bool = parameter(False, text="inverts a")
 
     class Scratch(Signal):
-        """Room for a step."""
+        """Scratch memory of one step."""
 
         inverse = Field(4, text="a*")
 
@@ -128,7 +128,7 @@ class QuaternionProduct(Block):
     def example_inputs(
         cls, rng: np.random.Generator, dimensions: Mapping[str, int]
     ) -> Mapping[str, Mapping[str, Any]]:
-        """Unit quaternions."""
+        """Return unit quaternions."""
         return {"a": random_unit(rng), "b": random_unit(rng)}
 
     @kernel
@@ -163,7 +163,7 @@ class MatrixToQuaternion(Block):
     def example_inputs(
         cls, rng: np.random.Generator, dimensions: Mapping[str, int]
     ) -> Mapping[str, Mapping[str, Any]]:
-        """A rotation matrix."""
+        """Return a rotation matrix."""
         matrix = np.zeros((3, 3))
         to_matrix(random_unit(rng)["value"], matrix)
         return {"u": {"value": matrix}}

@@ -22,7 +22,7 @@ from .vectors import (
 
 @kernel
 def first_tick(seconds: float, base_period: float) -> int:
-    """The first tick that is not before an instant [s]; one that is meant to be on a tick is."""
+    """Return the first tick that is not before an instant [s]; one that is meant to be on a tick is."""
     return math.ceil(seconds / base_period - 1e-6)
 
 
@@ -66,7 +66,7 @@ class Step(UnitFromParameters, Block):
             "after",
         )
 
-        at: float = parameter(1.0, unit="s", ge=0.0, text="when the step comes")
+        at: float = parameter(1.0, unit="s", ge=0.0, text="time of the step")
         before: ScalarOrVector = live_parameter(0.0, text="the value before the step")
         after: ScalarOrVector = live_parameter(1.0, text="the value from the step on")
 
@@ -91,15 +91,15 @@ class Ramp(UnitFromParameters, Block):
     class Params(VectorParameters, SourceParameters):
         in_unit = ("offset",)
 
-        start: float = parameter(0.0, unit="s", ge=0.0, text="when it begins to grow")
-        duration: float | None = parameter(None, unit="s", ge=0.0, text="how long it grows")
+        start: float = parameter(0.0, unit="s", ge=0.0, text="time at which it begins to grow")
+        duration: float | None = parameter(None, unit="s", ge=0.0, text="time for which it grows")
         slope: ScalarOrVector = live_parameter(1.0, text="growth per second")
         offset: ScalarOrVector = live_parameter(0.0, text="the value before the start")
 
     class Constants(Signal):
-        """What follows from the parameters."""
+        """Constants derived from the parameters."""
 
-        duration = Field(unit="s", text="how long it grows, maybe for ever")
+        duration = Field(unit="s", text="time for which it grows, maybe for ever")
 
     params: Params
     y = Output(Vector, text="the ramp")
@@ -131,7 +131,7 @@ class Pulse(UnitFromParameters, Block):
 
         duration: float = parameter(1.0, unit="s", gt=0.0, text="from one pulse to the next")
         width: float = parameter(0.5, ge=0.0, le=1.0, text="share of it that the pulse lasts")
-        start: float = parameter(0.0, unit="s", ge=0.0, text="when the first pulse begins")
+        start: float = parameter(0.0, unit="s", ge=0.0, text="time at which the first pulse begins")
         amplitude: ScalarOrVector = live_parameter(1.0, text="height of the pulses")
         offset: ScalarOrVector = live_parameter(0.0, text="the value between pulses")
 
@@ -195,7 +195,7 @@ class Chirp(UnitFromParameters, Block):
         end_frequency: float = parameter(10.0, unit="Hz", gt=0.0, text="frequency at the end")
         duration: float = parameter(10.0, unit="s", gt=0.0, text="of the sweep")
         sweep: Literal["linear", "exponential"] = parameter(
-            "linear", text="whether the frequency or its logarithm grows evenly"
+            "linear", text="the frequency or its logarithm grows evenly"
         )
         amplitude: float = live_parameter(1.0, text="half of peak to peak")
         offset: float = live_parameter(0.0, text="the mean")

@@ -43,12 +43,12 @@ class Transition(Parameters):
         None, text="the condition that must hold, or `not` and the condition that must not"
     )
     after: float = parameter(
-        0.0, unit="s", ge=0.0, text="how long the state must have lasted at least"
+        0.0, unit="s", ge=0.0, text="least time that the state must have lasted"
     )
 
 
 class StateName(Signal):
-    """Which state is present."""
+    """The present state."""
 
     index = Field((), dtype="int64", text="its place in the list of states, from 0")
     value = Field("n_states", dtype="bool", text="one truth value for each state")
@@ -58,19 +58,19 @@ class Transitions(NamedTuple):
     """All transitions, those from the first state first."""
 
     first: Indices1D
-    """For each state the place of its first transition; one more for the end."""
+    """Place of each state's first transition; one more for the end."""
     target: Indices1D
     """The state that is entered."""
     condition: Indices1D
     """The place of the condition; -1 where there is none."""
     expected: Flags1D
-    """What the condition must be."""
+    """Required value of the condition."""
     least_runs: Indices1D
-    """For how many runs the state must have lasted."""
+    """Number of runs that the state must have lasted."""
 
 
 class MachineState(Signal):
-    """What a state machine remembers."""
+    """Memory of a state machine."""
 
     index = Field((), dtype="int64", text="the present state")
     runs = Field((), dtype="int64", text="runs that have passed since it was entered")
@@ -100,7 +100,7 @@ class StateMachine(Block):
     params: Params
     u = Input(Flags, text="the conditions")
     state = Output(StateName, text="the present state")
-    elapsed = Output(Seconds, text="how long it has lasted")
+    elapsed = Output(Seconds, text="duration of the state so far")
     x = State(MachineState, text="the present state")
 
     @classmethod
@@ -188,10 +188,10 @@ def _unknown(kind: str, name: str, known: list[str]) -> UnmetRequirement:
 
 
 class Violations(Signal):
-    """What an assertion remembers."""
+    """Memory of an assertion."""
 
     count = Field((), dtype="int64", text="runs in which a bound was broken")
-    first = Field((), unit="s", text="when that was first")
+    first = Field((), unit="s", text="time of the first one")
     value = Field((), text="the element's value then")
     element = Field((), dtype="int64", text="the element that broke it then")
 
@@ -204,18 +204,18 @@ class Assertion(Bounded, Block):
     """
 
     class Params(VectorParameters):
-        lower: ScalarOrVector | None = parameter(None, text="what u must not be below")
-        upper: ScalarOrVector | None = parameter(None, text="what u must not be above")
-        action: Literal["stop", "mark"] = parameter("stop", text="what a broken bound does")
+        lower: ScalarOrVector | None = parameter(None, text="lower bound of u")
+        upper: ScalarOrVector | None = parameter(None, text="upper bound of u")
+        action: Literal["stop", "mark"] = parameter("stop", text="effect of a broken bound")
 
     params: Params
-    u = Input(Vector, text="what must keep the bounds")
-    ok = Output(Flag, text="whether it does in this run")
-    x = State(Violations, text="what was broken")
+    u = Input(Vector, text="the signal to bound")
+    ok = Output(Flag, text="the bounds are kept in this run")
+    x = State(Violations, text="the broken bounds")
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """The bounds must not cross, and one must be there."""
+        """Report bounds that cross, or the lack of any."""
         assert isinstance(params, cls.Params)
         yield from super().requires(params, context)
         if params.lower is None and params.upper is None:
@@ -223,7 +223,7 @@ class Assertion(Bounded, Block):
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, object]:
-        """A bound that is broken now and then."""
+        """Return a bound that is broken now and then."""
         return {"n": 2, "lower": -0.9, "upper": 0.9}
 
     def _reason(self) -> str:
@@ -235,7 +235,7 @@ class Assertion(Bounded, Block):
         )
 
     def metrics(self) -> Mapping[str, Metric]:
-        """Whether the bounds were kept, and in how many runs they were not."""
+        """Return whether the bounds were kept, and in how many runs they were not."""
         count = int(self.x.count)
         if not count:
             return {"success": True, "violations": 0}

@@ -22,7 +22,7 @@ from .vectors import SourceParameters, UnitFromParameters, Vector, VectorParamet
 
 
 def unsorted_points(name: str, points: Sequence[float]) -> Iterable[UnmetRequirement]:
-    """The unmet requirement where points do not rise from each to the next."""
+    """Report points that do not rise from each to the next."""
     for one, two in pairwise(points):
         if two <= one:
             yield UnmetRequirement(
@@ -47,16 +47,16 @@ class LookupTable(UnitFromParameters, Block):
         points: Numbers = parameter(text="inputs, rising", min_length=2)
         values: Numbers = parameter(text="the output at each of them", min_length=2)
         beyond: Literal["clamp", "extrapolate"] = parameter(
-            "clamp", text="what holds beyond the first and last point"
+            "clamp", text="rule beyond the first and last point"
         )
 
     params: Params
-    u = Input(Vector, text="where the table is read")
+    u = Input(Vector, text="place at which the table is read")
     y = Output(Vector, text="the table's values there")
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """The points must rise and each must have a value."""
+        """Report points that do not rise, or have no value each."""
         assert isinstance(params, cls.Params)
         yield from unsorted_points("points", params.points)
         if len(params.values) != len(params.points):
@@ -82,7 +82,7 @@ class LookupTable(UnitFromParameters, Block):
 
 
 class TableValue(Signal):
-    """What a table of several variables gives: a vector of one number."""
+    """Value of a table of several variables: a vector of one number."""
 
     value = Field(1, inferred=True, text="the number")
 
@@ -103,17 +103,17 @@ class LookupGrid(UnitFromParameters, Block):
         )
         values: Numbers = parameter(text="the table, the last variable fastest")
         beyond: Literal["clamp", "extrapolate"] = parameter(
-            "clamp", text="what holds beyond the first and last points"
+            "clamp", text="rule beyond the first and last points"
         )
 
     class Scratch(Signal):
-        """Room for a step."""
+        """Scratch memory of one step."""
 
         places = Field("n", dtype="int64", text="the cell that the input is in, by axis")
-        shares = Field("n", text="how far the input is through the cell, by axis")
+        shares = Field("n", text="share of the cell at which the input is, by axis")
 
     params: Params
-    u = Input(Vector, text="where the table is read, one element a variable")
+    u = Input(Vector, text="place at which the table is read, one element a variable")
     y = Output(TableValue, text="the table's value there")
 
     @classmethod
@@ -186,10 +186,8 @@ class TablePlayback(UnitFromParameters, Block):
         )
         time: str = parameter("time", text="the name of the column with the times")
         columns: list[str] = parameter(text="the names of the columns played", min_length=1)
-        between: Literal["linear", "hold"] = parameter(
-            "linear", text="what holds between two times"
-        )
-        repeat: bool = parameter(False, text="whether it begins again at the end")
+        between: Literal["linear", "hold"] = parameter("linear", text="rule between two times")
+        repeat: bool = parameter(False, text="begins again at the end")
 
     params: Params
     y = Output(Vector, text="the columns at the present time")
@@ -202,7 +200,7 @@ class TablePlayback(UnitFromParameters, Block):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """The table must be there and be one."""
+        """Report a table that is missing or is none."""
         assert isinstance(params, cls.Params)
         try:
             read_table(params.file, params.rows, params.time, params.columns, context.folder)
@@ -246,7 +244,7 @@ def read_table(
     columns: list[str],
     folder: Path,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The times (k) and the columns (n, k) of a table.
+    """Return the times (k) and the columns (n, k) of a table.
 
     Raises:
         ValueError: there is no such table, it lacks a column, or its times do not rise.

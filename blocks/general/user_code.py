@@ -1,17 +1,16 @@
-"""What the graph computes by a formula, a function, or from outside."""
+"""Computations of the graph by a formula, or values from outside."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from pydantic import field_validator
 
 from ...mathematics.arrays import Array1D, Indices1D
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.elementwise import FUNCTIONS
 from ...mathematics.expression import parse_expression
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
@@ -29,65 +28,6 @@ from .vectors import (
     VectorParameters,
 )
 
-Name = Literal[
-    "abs", "sign", "negative", "reciprocal", "square", "sqrt", "exp", "log", "log10",
-    "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "floor", "ceil", "round",
-]  # fmt: skip
-_SAME = ("abs", "negative", "floor", "ceil", "round")
-_OF_ANGLES = ("sin", "cos", "tan")
-_TO_ANGLES = ("asin", "acos", "atan")
-
-
-def _quantity(name: str, inputs: InputQuantities) -> Quantity | None:
-    """What a function makes of the quantity of ``u``."""
-    u = inputs["u"]
-    if u is None or name in _SAME:
-        return u
-    if name == "reciprocal":
-        return Quantity(frame=u.frame).times(u.unit, -1)
-    if name == "square":
-        return u.times(u.unit)
-    if name == "sqrt":
-        try:
-            return Quantity(None if u.unit is None else root(u.unit), u.frame)
-        except UnitError as error:
-            inputs.refuse("u", str(error))
-            return Quantity(None)
-    if name in _OF_ANGLES:
-        inputs.demand("u", ("rad", ""), f"{name} takes angles in rad")
-    elif name != "sign":
-        inputs.demand("u", ("",), f"{name} takes plain numbers")
-    return Quantity(parse_unit("rad") if name in _TO_ANGLES else ONE)
-
-
-class Function(KernelBlock):
-    """A function of every element by itself: y = f(u).
-
-    Angles are in rad; ``round`` rounds halves to even. Outside a function's domain, such as the
-    square root of a negative number, an element is not finite, and that ends the run with the
-    block's name.
-    """
-
-    class Params(VectorParameters):
-        function: Name = parameter("abs", text="which function")
-
-    params: Params
-    u = Input(Vector, text="the arguments")
-    y = Output(Vector, text="the function's values")
-
-    @classmethod
-    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """Angles go into sin, cos and tan; roots need even powers."""
-        assert isinstance(params, cls.Params)
-        return {"y": _quantity(params.function, inputs)}
-
-    def setup(self) -> None:
-        """Choose the function."""
-        self.kernel_calls = (
-            KernelCall(FUNCTIONS[self.params.function], self.u.value, self.y.value),
-        )
-
-
 INPUTS = ("a", "b", "c", "d", "e", "f", "g", "h")
 ABSENT = {"value": 0.0}
 
@@ -96,12 +36,12 @@ class Expression(KernelBlock):
     """A formula, element by element, of the inputs a to h, the time t [s] and named constants.
 
     It may hold numbers, ``+ - * / ** %``, comparisons (1 where they hold, else 0), brackets,
-    ``x if condition else y``, ``pi``, and abs, sign, sqrt, exp, log, sin, cos, tan, asin, acos,
-    atan, atan2, tanh, floor, ceil, min, max, hypot::
+    ``x if condition else y``, ``pi``, and abs, sign, sqrt, exp, log, log10, sin, cos, tan, asin,
+    acos, atan, atan2, sinh, cosh, tanh, floor, ceil, round (halves to even), min, max, hypot::
 
         with: {expression: "k * (a - b) if t > 1 else 0", constants: {k: 2.5}}
 
-    Units are checked in it: ``units: {k: N/m}`` says those of constants, t is in s, and other
+    Units are checked in it: ``units: {k: N/m}`` gives those of constants, t is in s, and other
     numbers are plain. ``unit: unchecked`` switches this off.
 
     It is never evaluated as Python: each operation is a call of a kernel. Both sides of a choice are computed, so neither
@@ -112,7 +52,7 @@ class Expression(KernelBlock):
         expression: str = parameter(text="the formula")
         constants: dict[str, float] = parameter({}, text="numbers by the names the formula has")
         units: dict[str, str] = parameter({}, text="units of constants, by name")
-        unit: str | None = parameter(None, text="unit of y, if it is said and not computed")
+        unit: str | None = parameter(None, text="unit of y, if it is given and not computed")
 
         @field_validator("unit", "units")
         @classmethod
@@ -134,7 +74,7 @@ class Expression(KernelBlock):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """The formula must be one, and every input that it reads must be wired."""
+        """Report a formula that is none, or reads an input that is not wired."""
         assert isinstance(params, cls.Params)
         for name in params.constants:
             if name in (*INPUTS, "t", "pi") or not name.isidentifier():
@@ -159,7 +99,7 @@ class Expression(KernelBlock):
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """The unit of the formula, and the one frame that its inputs have."""
+        """Return the unit of the formula, and the one frame that its inputs have."""
         assert isinstance(params, cls.Params)
         formula = parse_expression(params.expression, (*INPUTS, "t", *params.constants))
         read = {name: inputs[name] for name in formula.names if name in INPUTS}
@@ -183,7 +123,7 @@ class Expression(KernelBlock):
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """A formula of all inputs."""
+        """Return a formula of all inputs."""
         return {
             "n": 2,
             "expression": "k * a - b + e * f if c > d else sin(t) * d + g - h",
@@ -208,20 +148,21 @@ class Expression(KernelBlock):
 
 @kernel
 def _write_time(tick: Indices1D, base_period: float, time: Array1D) -> None:
-    """The seconds since the run began, in each element."""
+    """Write the seconds since the run began into each element."""
     time[:] = base_period * tick[0]
 
 
 _RAD = parse_unit("rad")
-_EXPRESSION_UNITS_TO_ANGLES = ("asin", "acos", "atan", "atan2")
+_TO_ANGLES = ("asin", "acos", "atan", "atan2")
 _ALIKE = ("min", "max", "hypot", "atan2")
-_EXPRESSION_UNITS_SAME = ("abs", "floor", "ceil")
+_SAME = ("abs", "floor", "ceil", "round")
+_OF_ANGLES = ("sin", "cos", "tan")
 TIME = {"t": SECOND}
 """The unit of the variable that every expression has."""
 
 
 def unit_of(node: ast.expr, units: Mapping[str, Unit | None]) -> Unit | None:
-    """The unit of a checked expression; ``None`` where it is not checked.
+    """Return the unit of a checked expression; ``None`` where it is not checked.
 
     ``units`` has those of the variables. Numbers are plain; zero has every unit.
 
@@ -257,7 +198,7 @@ def unit_of(node: ast.expr, units: Mapping[str, Unit | None]) -> Unit | None:
 
 
 def _factor(node: ast.expr, units: Mapping[str, Unit | None]) -> Unit | None:
-    """The same for a factor, in which zero is as plain as any number."""
+    """Return the same as ``unit_of`` for a factor, in which zero is as plain as any number."""
     return ONE if isinstance(node, ast.Constant) else unit_of(node, units)
 
 
@@ -287,9 +228,9 @@ def _call(name: str, arguments: list[ast.expr], units: Mapping[str, Unit | None]
     first = arguments[0]
     if name in _ALIKE:
         found = _alike(first, arguments[1], units)
-        return _RAD if name in _EXPRESSION_UNITS_TO_ANGLES else found
+        return _RAD if name in _TO_ANGLES else found
     unit = unit_of(first, units)
-    if name in _EXPRESSION_UNITS_SAME:
+    if name in _SAME:
         return unit
     if name == "sqrt":
         return None if unit is None else root(unit)
@@ -300,7 +241,7 @@ def _call(name: str, arguments: list[ast.expr], units: Mapping[str, Unit | None]
         raise UnitError(
             f"{name} takes {taken[0] if len(taken) > 1 else 'plain numbers'}, not {unit}"
         )
-    return _RAD if name in _EXPRESSION_UNITS_TO_ANGLES else ONE
+    return _RAD if name in _TO_ANGLES else ONE
 
 
 class External(UnitFromParameters, Block):
@@ -314,8 +255,8 @@ class External(UnitFromParameters, Block):
         in_unit = ("initial",)
 
     params: Params
-    y = Output(Vector, text="what was set last")
-    x = State(Vector, text="what was set last")
+    y = Output(Vector, text="values that were set last")
+    x = State(Vector, text="values that were set last")
 
     def setup(self) -> None:
         """Begin with the initial value."""

@@ -73,7 +73,7 @@ class Flags(Signal):
 class Flag(Signal):
     """One truth value."""
 
-    value = Field((), dtype="bool", text="whether it holds")
+    value = Field((), dtype="bool", text="it holds")
 
 
 NEVER = {"value": False}
@@ -88,14 +88,14 @@ class InitialValueParameters(VectorParameters):
     )
 
     def start_value(self) -> NDArray[np.float64]:
-        """``initial`` as an array of n elements."""
+        """Return ``initial`` as an array of n elements."""
         return np.full(self.n, self.initial)
 
 
 def crossed_bounds(
     lower: ScalarOrVector | None, upper: ScalarOrVector | None, n: int
 ) -> Iterable[UnmetRequirement]:
-    """The unmet requirement where a lower bound is above its upper one."""
+    """Report a lower bound that is above its upper one."""
     low = np.full(n, -np.inf if lower is None else lower)
     high = np.full(n, np.inf if upper is None else upper)
     for i in np.flatnonzero(low > high)[:1]:
@@ -121,7 +121,7 @@ class Bounded:
 
     @classmethod
     def requires(cls, params: Any, context: Context) -> Iterable[UnmetRequirement]:
-        """The bounds must not cross."""
+        """Report bounds that cross."""
         return crossed_bounds(params.lower, params.upper, params.n)
 
     def prepare(self: Any) -> None:
@@ -132,7 +132,7 @@ class Bounded:
 
 
 def _readable(text: str) -> str:
-    """The text of a unit. Raises ``UnitError`` if it cannot be read."""
+    """Return the text of a unit. Raises ``UnitError`` if it cannot be read."""
     read_unit(text)
     return text
 
@@ -142,9 +142,9 @@ UnitText = Annotated[str, AfterValidator(_readable)]
 
 
 class InUnit(Parameters):
-    """The base of parameters that have a common unit, which the graph says.
+    """The base of parameters that have a common unit, which the graph gives.
 
-    It is said by ``unit``, or with the numbers themselves: ``gain: 40 N m/rad``. Numbers in
+    It is given by ``unit``, or with the numbers themselves: ``gain: 40 N m/rad``. Numbers in
     ``in_unit`` that are written with another unit of the same dimension are converted.
     """
 
@@ -166,17 +166,17 @@ class InUnit(Parameters):
 
 
 class SourceParameters(InUnit):
-    """The base of the parameters of sources: the graph says what their numbers are."""
+    """The base of the parameters of sources: the graph gives the quantity of their numbers."""
 
     frame: str | None = parameter(None, text="frame of the numbers, such as world")
 
     def quantity(self) -> Quantity:
-        """The quantity of the numbers."""
+        """Return the quantity of the numbers."""
         return Quantity(read_unit(self.unit), self.frame)
 
 
 def _units_in(value: Any) -> list[str]:
-    """The units of all texts such as ``3 m`` in a value."""
+    """Return the units of all texts such as ``3 m`` in a value."""
     if isinstance(value, str):
         match = QUANTITY.match(value)
         return [match["unit"]] if match is not None and match["unit"].strip() else []
@@ -186,7 +186,7 @@ def _units_in(value: Any) -> list[str]:
 
 
 def _numbers(value: Any, unit: str) -> Any:
-    """The value with its texts as numbers in ``unit``; what cannot be converted stays a text."""
+    """Return the value with its texts as numbers in ``unit``; what cannot be converted stays a text."""
     if isinstance(value, str):
         try:
             return parse_quantity(value, unit)
@@ -198,11 +198,11 @@ def _numbers(value: Any, unit: str) -> Any:
 
 
 class UnitFromParameters:
-    """A block whose output ``y`` is what its parameters ``unit`` and ``frame`` say."""
+    """A block whose output ``y`` has the ``unit`` and ``frame`` of its parameters."""
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """The quantity of the parameters."""
+        """Return the quantity of the parameters."""
         assert isinstance(params, SourceParameters)
         return {"y": params.quantity()}
 
@@ -212,7 +212,7 @@ class UnitOfInput:
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """The quantity of ``u``."""
+        """Return the quantity of ``u``."""
         return {"y": inputs["u"]}
 
 
@@ -221,7 +221,7 @@ class UnitOfProduct:
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """The quantity of ``u``, times the unit."""
+        """Return the quantity of ``u``, times the unit."""
         assert isinstance(params, InUnit)
         u = inputs["u"]
         return {"y": u and u.times(read_unit(params.unit))}
@@ -235,7 +235,7 @@ else:
 
 
 def equal_rows(value: Matrix) -> Matrix:
-    """The same matrix.
+    """Return the same matrix.
 
     Raises:
         ValueError: it has no column, or its rows are not equally long.
@@ -247,5 +247,5 @@ def equal_rows(value: Matrix) -> Matrix:
 
 
 def matrix_rows(*names: str) -> Any:
-    """The validator that a class of parameters has for its matrices."""
+    """Return the validator that a class of parameters has for its matrices."""
     return field_validator(*names)(equal_rows)

@@ -60,7 +60,7 @@ class Mux(Pairs, Block):
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """What both have in common; the unit is not checked where they differ."""
+        """Return the quantity that both have in common; the unit is not checked where they differ."""
         a, b = inputs["a"], inputs["b"]
         if a is None or b is None:
             return {}
@@ -78,7 +78,7 @@ class Demux(Pairs, Block):
 
     Params = PairSizes
     params: PairSizes
-    u = Input(JoinedVector, text="what is split")
+    u = Input(JoinedVector, text="the vector to split")
     a = Output(First, text="the first elements")
     b = Output(Second, text="the elements behind them")
 
@@ -105,10 +105,12 @@ class Selector(UnitOfInput, Block):
 
     class Params(Parameters):
         n: int = parameter(ge=1, text="elements of the input")
-        elements: list[int] = parameter(text="which elements, counted from 0", min_length=1)
+        elements: list[int] = parameter(
+            text="indices of the elements, counted from 0", min_length=1
+        )
 
     params: Params
-    u = Input(Vector, text="what is selected from")
+    u = Input(Vector, text="the vector to select from")
     y = Output(Selected, text="the selected elements")
 
     @classmethod

@@ -30,7 +30,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.elementary import atan2
 from ...mathematics.kernel import kernel
-from ...planner.library.jump_table import JumpTable, TableRows, read_table, table_rows
+from ...planner.library.jump_table import JumpTable, TableRows, table_rows
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet
 from ...robots.limb import FootKind, foot_shape
@@ -40,6 +40,7 @@ from ...runtime.language.context import Clock, Context
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import DelayEstimate, JumpReference
+from .table_reading import read_table
 
 _STEP = 0.002
 """Longest step of the integration [s]."""

@@ -15,7 +15,6 @@ from ...planner.library.jump_table import (
     JumpTable,
     TableRows,
     flight_rotation,
-    read_table,
     table_rows,
 )
 from ...runtime.language.block import Block, Context, Input, Metric, Output, State, UnmetRequirement
@@ -29,6 +28,7 @@ from .plan_progress import (
     ProgressParameters,
     follow_plan,
 )
+from .table_reading import read_table
 
 if TYPE_CHECKING:
     from ...planner.checking.validity import ValidityReport
@@ -282,12 +282,12 @@ class JumpPlan(Block):
         return read_learnt(path, context.robot.name).correction(launch_of(task))
 
     def setup(self) -> None:
-        from ...planner.library.once import reference_table_once
+        from ...planner.library.validation_cache import cached_reference_table
 
         robot, task = self.robot, planned_task(self.params, self.context)
         plan = self._plan(task, robot)
         self._report = self._report_validity(plan)
-        table = reference_table_once(plan, robot, self.params.stand_time)
+        table = cached_reference_table(plan, robot, self.params.stand_time)
         self.table = table_rows(table)
         self.rotation = self._time_progress(table)
 

@@ -274,7 +274,7 @@ class LandingHeuristic(Block):
         lowest, lead = lowest_height(terms.foot_position), params.lead_time
         if params.lead_by == "fall":
             if flying and params.law == "predicted" and not overdue:
-                memory.early = come_early(reference, terms, left, memory, scratch)
+                memory.early = early_touchdown_offset(reference, terms, left, memory, scratch)
             lead += memory.early
         turn_frame(reference, terms, params, overdue, memory, scratch)
         if params.limits_about == "stance":
@@ -395,7 +395,7 @@ def predict(
 
 
 @kernel
-def come_early(
+def early_touchdown_offset(
     plan: JumpReference,
     terms: DynamicsTerms,
     left: float,

@@ -126,7 +126,7 @@ def fastest_change(acceleration: float, limit: float, duration: float) -> float:
 
 
 @kernel
-def throw(
+def add_velocity_change(
     moved: MovedLanding,
     axis: int,
     wanted: float,

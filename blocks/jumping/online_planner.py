@@ -14,8 +14,8 @@ from ...runtime.language.block import Block, Context, Input, Metric, Output, Sta
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters
 from ...runtime.language.signals import Field
-from ..signals import PlanOutcome, PlanPart, PlanRequest
-from ..signals.steering import PART_ROWS, PLAN_ROWS, PlanRows
+from ..signals import PlanOutcome, PlanRequest, PlanSegment
+from ..signals.steering import PLAN_ROWS, SEGMENT_ROWS, PlanRows
 
 if TYPE_CHECKING:
     from ...planner.online.next_hop import HopPlan
@@ -25,20 +25,20 @@ class PlanAnswer(PlanRows):
     """The state of ``OnlinePlanner``: the last plan, and how much of it has been handed over."""
 
     number = Field(dtype="int64", text="of the request that was planned last")
-    parts = Field(dtype="int64", text="number of its parts")
+    segments = Field(dtype="int64", text="number of its segments")
     given = Field(dtype="int64", text="number of parts handed over")
     outcomes = Field(len(PlanOutcome), dtype="int64", text="number of plans of each PlanOutcome")
 
 
 class OnlinePlanner(Block):
-    """Plans the jump that was asked for, and hands the plan over, a part in every run.
+    """Plans the requested jump, and hands the plan over, a part in every run.
 
     It belongs in the background (``background: {latency: 250 ms}``): a plan takes a tenth of a second on a busy machine.
     A motion is interpolated from the robot's stored plans of hops (``planner/online/plan_samples``), and corrected in a few steps
     until it fulfils all constraints of the whole-body problem of ``aloft plan``, on 44 knots with all coordinates
     (``planner/online/correction``). The plan must pass the check with exact dynamics that every plan passes. A jump out of
     reach is replaced by the nearest within it; where no motion is found, or it fails the check, the
-    nearest stored plan is the answer. ``part.outcome`` says so, and the metrics count it.
+    nearest stored plan is the answer. ``segment.outcome`` reports that, and the metrics count it.
 
     A plan follows from its request alone: the same requests give the same bytes on the same machine.
     The metrics have the times of planning.
@@ -50,7 +50,7 @@ class OnlinePlanner(Block):
         "a plan is made by the planner and its solver; run this block in the background"
     )
     request = Input(PlanRequest, text="the jump that should be planned")
-    part = Output(PlanPart, text="the next rows of its plan")
+    segment = Output(PlanSegment, text="the next rows of its plan")
     answer = State(PlanAnswer, text="the plan that is handed over")
 
     @classmethod
@@ -88,7 +88,7 @@ class OnlinePlanner(Block):
         self._times: list[float] = []
 
     def step(self) -> None:
-        request, answer, part = self.request, self.answer, self.part
+        request, answer, segment = self.request, self.answer, self.segment
         number = int(request.number)
         if number != int(answer.number):
             found = self._planner.plan(
@@ -100,16 +100,20 @@ class OnlinePlanner(Block):
                 )
             )
             self._keep(found, number)
-        answer.given[()] = min(int(answer.given) + 1, int(answer.parts))
+        answer.given[()] = min(int(answer.given) + 1, int(answer.segments))
         given = max(int(answer.given) - 1, 0)
-        rows = slice(given * PART_ROWS, (given + 1) * PART_ROWS)
-        part.number[()], part.part[()], part.parts[()] = answer.number, given, answer.parts
-        part.time[:] = answer.time[rows]
-        part.rows[:] = answer.rows[rows]
-        part.contact[:] = answer.contact[rows]
-        part.marks[:], part.jump[:] = answer.marks, answer.jumps[0]
-        part.toes_first[()], part.outcome[()] = answer.toes_first[0], answer.outcome
-        part.ahead[()], part.aside[()], part.turn[()], part.up[()] = answer.done
+        rows = slice(given * SEGMENT_ROWS, (given + 1) * SEGMENT_ROWS)
+        segment.number[()], segment.segment[()], segment.segments[()] = (
+            answer.number,
+            given,
+            answer.segments,
+        )
+        segment.time[:] = answer.time[rows]
+        segment.rows[:] = answer.rows[rows]
+        segment.contact[:] = answer.contact[rows]
+        segment.marks[:], segment.jump[:] = answer.marks, answer.jumps[0]
+        segment.toes_first[()], segment.outcome[()] = answer.toes_first[0], answer.outcome
+        segment.ahead[()], segment.aside[()], segment.turn[()], segment.up[()] = answer.done
 
     def _keep(self, found: HopPlan, number: int) -> None:
         """Write a plan's table into the state."""
@@ -125,7 +129,7 @@ class OnlinePlanner(Block):
         answer.marks[:], answer.jumps[:] = table.marks, table.jumps
         answer.toes_first[:] = table.toes_first
         answer.number[()], answer.given[()] = number, 0
-        answer.parts[()] = -(-n // PART_ROWS)
+        answer.segments[()] = -(-n // SEGMENT_ROWS)
         answer.outcomes[found.outcome] += 1
         answer.outcome[()] = int(found.outcome)
         answer.done[:] = found.done

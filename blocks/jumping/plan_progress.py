@@ -11,11 +11,12 @@ from ...mathematics.elementary import atan2
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import pitch_angle, wrap
 from ...mathematics.stance_feet import has_contact
-from ...planner.library.jump_table import FlightRotation, TableRows, locate, read_table
+from ...planner.library.jump_table import FlightRotation, TableRows
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DelayEstimate, DynamicsTerms, JumpReference, Phase
 from .jump_phase import planned_touchdown_height, time_to_height
+from .table_reading import locate, read_table
 
 FASTEST = 0.5
 """Largest change of a plan's speed, as a share of time."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ...mathematics.kernel import kernel
 from ...runtime.language.signals import Field
-from ..signals import PlanPart
-from ..signals.steering import PART_ROWS, PLAN_ROWS, PlanRows
+from ..signals import PlanSegment
+from ..signals.steering import PLAN_ROWS, SEGMENT_ROWS, PlanRows
 
 BEHIND = 10.0
 """Rows behind the last one of a plan repeat it, so far apart [s]."""
@@ -14,7 +14,7 @@ BEHIND = 10.0
 class ReceivedPlan(PlanRows):
     """The plan that is handed over, row by row."""
 
-    parts = Field(dtype="int64", text="parts that have come")
+    segments = Field(dtype="int64", text="segments that have come")
     whole = Field(dtype="bool", text="all parts have come")
 
 
@@ -27,29 +27,29 @@ class FollowedPlan(PlanRows):
 
 
 @kernel
-def receive(part: PlanPart, number: int, received: ReceivedPlan) -> None:
+def receive(segment: PlanSegment, number: int, received: ReceivedPlan) -> None:
     """Copy the part of the plan that comes next, if it is there."""
-    if received.whole or part.number != number or part.part != received.parts:
+    if received.whole or segment.number != number or segment.segment != received.segments:
         return
-    first = part.part * PART_ROWS
-    for row in range(PART_ROWS):
-        received.time[first + row] = part.time[row]
-        received.rows[first + row, :] = part.rows[row]
-        for point in range(part.contact.shape[1]):
-            received.contact[first + row, point] = part.contact[row, point]
-    received.parts += 1
-    if received.parts < part.parts:
+    first = segment.segment * SEGMENT_ROWS
+    for row in range(SEGMENT_ROWS):
+        received.time[first + row] = segment.time[row]
+        received.rows[first + row, :] = segment.rows[row]
+        for point in range(segment.contact.shape[1]):
+            received.contact[first + row, point] = segment.contact[row, point]
+    received.segments += 1
+    if received.segments < segment.segments:
         return
-    last = received.parts * PART_ROWS - 1
+    last = received.segments * SEGMENT_ROWS - 1
     for row in range(last + 1, received.time.shape[0]):
         received.time[row] = received.time[row - 1] + BEHIND
         received.rows[row, :] = received.rows[last]
-        for point in range(part.contact.shape[1]):
+        for point in range(segment.contact.shape[1]):
             received.contact[row, point] = received.contact[last, point]
-    received.marks[:] = part.marks
-    received.jumps[0, :] = part.jump
-    received.toes_first[0] = part.toes_first
-    received.outcome = part.outcome
-    received.done[0], received.done[1] = part.ahead, part.aside
-    received.done[2], received.done[3] = part.turn, part.up
+    received.marks[:] = segment.marks
+    received.jumps[0, :] = segment.jump
+    received.toes_first[0] = segment.toes_first
+    received.outcome = segment.outcome
+    received.done[0], received.done[1] = segment.ahead, segment.aside
+    received.done[2], received.done[3] = segment.turn, segment.up
     received.whole = True

@@ -17,11 +17,8 @@ from ...planner.library.jump_table import (
     JumpTable,
     TableRows,
     integral,
-    interpolate_rows,
     row_dimensions,
     table_rows,
-    write_columns,
-    write_marks,
 )
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Input, Output, State
@@ -44,6 +41,7 @@ from .plan_progress import (
     keep_in_time,
     plan_time,
 )
+from .table_reading import interpolate_rows, write_columns, write_marks
 
 if TYPE_CHECKING:
     from ...planner.task.task import JumpTask
@@ -168,14 +166,14 @@ class SpeedPlan(Block):
     def _table_of(self, way: float) -> JumpTable:
         """Return the row of jumps of this length."""
         from ...planner.library.library import PlanLibrary
-        from ...planner.library.once import reference_table_once
+        from ...planner.library.validation_cache import cached_reference_table
 
         robot = self.robot
         try:
             plan, _ = PlanLibrary(robot).plan(row_task(self.params, robot.name, way))
         except AloftError as error:
             raise BlockError(f"no row of jumps of {way:g} m can be planned: {error}") from error
-        return reference_table_once(plan, robot, self.params.stand_time)
+        return cached_reference_table(plan, robot, self.params.stand_time)
 
     @kernel
     @staticmethod
@@ -205,7 +203,7 @@ class SpeedPlan(Block):
             memory.way = memory.before
         if memory.jump < ROW and time - memory.skipped >= table.jumps[memory.jump, 2]:
             left = params.jumps - memory.landed - 2
-            land(min(wanted, slow + left * change), change, params.jumps, table, memory)
+            begin_next_jump(min(wanted, slow + left * change), change, params.jumps, table, memory)
         now = time - memory.skipped
         mix_rows(now, lead, constants.period, table, firsts, ways, memory, reference, scratch)
         write_marks(table, now, reference)
@@ -253,7 +251,9 @@ def joined(tables: list[JumpTable]) -> TableRows:
 
 
 @kernel
-def land(wanted: float, change: float, jumps: int, table: TableRows, memory: SpeedMemory) -> None:
+def begin_next_jump(
+    wanted: float, change: float, jumps: int, table: TableRows, memory: SpeedMemory
+) -> None:
     """Begin the next jump of the row, or the cycle again."""
     memory.landed += 1
     memory.place += memory.way
@@ -276,7 +276,7 @@ def tell_goal(memory: SpeedMemory, goal: CourseGoal) -> None:
 
 
 @kernel
-def hat(ways: Array1D, number: int, way: float) -> float:
+def triangle_weight(ways: Array1D, number: int, way: float) -> float:
     """Return the weight of a row in the linear interpolation between the ``ways`` at a ``way`` within them."""
     weight = 1.0
     if number > 0 and way < ways[number]:
@@ -311,7 +311,10 @@ def mix_rows(
     stood = 0.0
     at = min(now, 0.5 * firsts[1] - lead - hold)
     for number in range(ways.shape[0]):
-        start, end = hat(ways, number, memory.before), hat(ways, number, memory.way)
+        start, end = (
+            triangle_weight(ways, number, memory.before),
+            triangle_weight(ways, number, memory.way),
+        )
         if start == 0.0 and end == 0.0:
             continue
         interpolate_rows(table, firsts[number] + at, lead, hold, table.values)

@@ -9,7 +9,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.interpolation import minimum_jerk
 from ...mathematics.kernel import kernel
-from ...planner.library.jump_table import JumpTable, TableRows, read_table
+from ...planner.library.jump_table import JumpTable, TableRows
 from ...robots.description import RobotDescription
 from ...robots.pinocchio_model import build_pinocchio_model
 from ...runtime.language.block import Input, State
@@ -26,10 +26,11 @@ from .guided_motion import (
     MotionRecorder,
     check_limits,
 )
+from .table_reading import read_table
 
 
 class StandReference(GuidedReference):
-    """The whole body stands as its description says, and with a ``squat_depth`` squats and rises.
+    """The whole body stands as described, and with a ``squat_depth`` squats and rises.
 
     The feet stand still and the base stays level. For ``stand_time`` the robot stands in its
     standing pose. With a ``squat_depth`` above zero its centre of mass then goes down by that much

@@ -12,13 +12,7 @@ from ...mathematics.constants import GRAVITY
 from ...mathematics.elementary import hypot, sincos
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import mean_heading, pattern_turn, turn_about_vertical, wrap
-from ...planner.library.jump_table import (
-    FlightRotation,
-    TableRows,
-    fed_forward,
-    integrate_rows,
-    row_dimensions,
-)
+from ...planner.library.jump_table import FlightRotation, TableRows, fed_forward, row_dimensions
 from ...planner.online.hop_plans import level_reach, missing_plans, standing_row
 from ...planner.online.hop_request import LEVEL
 from ...robots.description import RobotDescription
@@ -45,8 +39,8 @@ from ..signals import (
     Phase,
     PhaseState,
     PlanOutcome,
-    PlanPart,
     PlanRequest,
+    PlanSegment,
 )
 from ..signals.steering import PLAN_ROWS
 from .moved_landing import (
@@ -57,11 +51,11 @@ from .moved_landing import (
     MotionScratch,
     MovedLanding,
     RetargetParameters,
+    add_velocity_change,
     begin_swing,
     middle_of,
     move_landing,
     place_feet,
-    throw,
 )
 from .plan_progress import (
     PlanProgress,
@@ -71,6 +65,7 @@ from .plan_progress import (
     read_plan,
 )
 from .received_plan import BEHIND, FollowedPlan, ReceivedPlan, receive
+from .table_reading import integrate_rows
 
 NEVER = 1e6
 """The time [s] of a lift-off that is not planned."""
@@ -133,7 +128,7 @@ class SteeredPlan(Block):
     be move on by it, or to it where it is ``placed``. Until the plan begins a command that
     ``replaces`` takes the place of the one that was taken, and the jump is requested anew. The ``request`` is the way from where the feet *are* to that goal, so a
     landing that missed its place is corrected by the next jump. ``OnlinePlanner``, which works in the
-    background, answers with the ``part``s of a plan. When all have come, and the robot has stood up for
+    background, answers with the ``segment``s of a plan. When all have come, and the robot has stood up for
     ``rest_time`` and is at rest, the plan begins at the measured place and heading of the feet. It is at rest where its capture
     point c + c' / w, seen from the middle of the feet, is within ``rest_offset`` of where the plan has it; for that it waits by ``rest_limit`` at
     most. A robot that has taken a step, or slid by ``ask_again``, since the request makes a new one. The plan of a jump
@@ -221,7 +216,7 @@ class SteeredPlan(Block):
     params: Params
     constants: SteeringConstants
     command = Input(JumpCommand, text="the next jump")
-    part = Input(PlanPart, text="the planner's answer")
+    segment = Input(PlanSegment, text="the planner's answer")
     phase = Input(PhaseState, text="the phase, with steps; wire it with a delay of 1")
     terms = Input(DynamicsTerms, text="the measured motion")
     delay = Input(DelayEstimate, default={"delay": 0.002}, text="the delay that is compensated")
@@ -277,7 +272,7 @@ class SteeredPlan(Block):
     @staticmethod
     def step(
         command: JumpCommand,
-        part: PlanPart,
+        segment: PlanSegment,
         phase: PhaseState,
         terms: DynamicsTerms,
         delay: DelayEstimate,
@@ -312,7 +307,7 @@ class SteeredPlan(Block):
         if stands and not memory.started:
             begin(scratch.place, heading, memory)
         if memory.waits:
-            receive(part, memory.requests, received)
+            receive(segment, memory.requests, received)
         landed = phase.phase == Phase.LANDING and phase.time_since_touchdown >= params.ask_time
         rests = phase.phase == Phase.RECOVER
         free = not memory.waits or command.replaces
@@ -320,11 +315,11 @@ class SteeredPlan(Block):
             if not memory.waits and memory.jumps > 0:
                 learn(scratch.place, heading, params.learning, memory)
             ask(command, scratch.place, heading, memory)
-            received.parts = 0
+            received.segments = 0
             received.whole = False
         elif rests and memory.waits and has_moved(scratch.place, heading, params.ask_again, memory):
             request_way(scratch.place, heading, memory)
-            received.parts = 0
+            received.segments = 0
             received.whole = False
         rested = stands
         if rests and phase.time_in_phase >= params.rest_time:
@@ -341,7 +336,7 @@ class SteeredPlan(Block):
                 memory.goal[:] = scratch.place[:2]
                 memory.goal_heading = heading
                 memory.level = memory.before_level
-                land_at(followed.done, memory)
+                move_goal_by_plan(followed.done, memory)
             progress.late = 0.0
         time = read_plan(now - followed.began, delay, reference, progress, table, constants)
         if not memory.waits and command.replaces and command.number > memory.taken:
@@ -494,10 +489,10 @@ def retarget(
     within_turn = min(max(turn, -constants.turn - asked[2]), constants.turn - asked[2])
     if thrusts:
         most = params.retarget_limit
-        throw(moved, AHEAD, within_ahead, reference, params, most)
-        throw(moved, ASIDE, within_aside, reference, params, most)
-        throw(moved, UP, up, reference, params, params.retarget_height)
-        throw(moved, TURN, within_turn, reference, params, params.retarget_turn)
+        add_velocity_change(moved, AHEAD, within_ahead, reference, params, most)
+        add_velocity_change(moved, ASIDE, within_aside, reference, params, most)
+        add_velocity_change(moved, UP, up, reference, params, params.retarget_height)
+        add_velocity_change(moved, TURN, within_turn, reference, params, params.retarget_turn)
     else:
         begin_swing(moved, reference)
         most = params.foothold_limit
@@ -531,7 +526,7 @@ def tell_request(memory: SteeringState, request: PlanRequest) -> None:
 
 
 @kernel
-def land_at(done: Array1D, memory: SteeringState) -> None:
+def move_goal_by_plan(done: Array1D, memory: SteeringState) -> None:
     """Move the goal to where a plan lands, with the robot's own error."""
     ahead = done[0] + memory.bias[memory.kind, 0]
     aside = done[1] + memory.bias[memory.kind, 1]

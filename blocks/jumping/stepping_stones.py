@@ -17,7 +17,7 @@ from ...runtime.language.signals import Field, Signal
 from ..signals import JumpCommand, PlanRequest, SeenStones
 from ..signals.steering import STONES_SEEN
 
-Span = tuple[float, float]
+Interval = tuple[float, float]
 CLOSE = 1e-3
 """Stones of one course are at least so far apart [m]."""
 
@@ -28,7 +28,7 @@ class StoneParameters(Parameters):
     x: float = parameter(unit="m", text="of its middle, ahead of where the robot starts")
     y: float = parameter(0.0, unit="m", text="of its middle, to the left")
     top: float = parameter(0.0, unit="m", ge=-1.0, le=5.0, text="its height")
-    size: Span | None = parameter(
+    size: Interval | None = parameter(
         None, unit="m", text="its extent ahead and aside; none: that of all stones"
     )
 
@@ -38,7 +38,7 @@ class RandomStones(Parameters):
 
     count: int = parameter(10, ge=1, le=200, text="number of stones")
     seed: int = parameter(0, ge=0, le=2**31, text="seed of the random draws")
-    gap: Span = parameter(
+    gap: Interval = parameter(
         (0.02, 0.14), unit="m", text="least and greatest gap between a stone and the next one"
     )
     aside: float = parameter(
@@ -67,8 +67,8 @@ class SteppingStonesParameters(Parameters):
 
     stones: tuple[StoneParameters, ...] = parameter((), text="the stones, in order; none: `random`")
     random: RandomStones = parameter(RandomStones(), text="parameters of their random draws")
-    size: Span = parameter((0.12, 0.20), unit="m", text="extent of a stone ahead and aside")
-    start: Span = parameter(
+    size: Interval = parameter((0.12, 0.20), unit="m", text="extent of a stone ahead and aside")
+    start: Interval = parameter(
         (0.30, 0.40), unit="m",
         text="extent behind and aside of the one on which the robot starts, whose front edge is that of a stone",
     )  # fmt: skip

@@ -38,23 +38,23 @@ SETTLING = 0.15
 
 
 class CourseRecord(StandRecord):
-    """What the judgement of a course needs. Places are those of the middle of the feet."""
+    """Record for the judgement of a course. Places are those of the middle of the feet."""
 
     middle = Field(2, unit="m", text="middle of the feet, when it was last found")
     heading = Field(unit="rad", text="their heading then")
-    start = Field(2, unit="m", text="where it stood before the first jump")
+    start = Field(2, unit="m", text="place before the first jump")
     start_heading = Field(unit="rad", text="its heading then")
-    unloaded = Field(unit="s", text="for how long all points have been off the ground")
-    flies = Field(dtype="bool", text="whether it flies")
+    unloaded = Field(unit="s", text="time for which all points have been off the ground")
+    flies = Field(dtype="bool", text="it flies")
     landed_time = Field(unit="s", text="of the last touchdown")
-    measured = Field(dtype="bool", text="whether the place of that landing has been measured")
+    measured = Field(dtype="bool", text="the place of that landing has been measured")
     jumps = Field(dtype="int64", text="landings whose place has been measured")
-    target = Field(2, unit="m", text="where that landing should be")
+    target = Field(2, unit="m", text="goal of that landing")
     target_heading = Field(unit="rad", text="the heading there")
     off = Field(2, unit="m", text="way from the target, last landing")
     place_error = Field(unit="m", text="distance from the target, last landing")
     length_errors = Field(
-        unit="m", text="sum of how far these ways differ from one landing to the next"
+        unit="m", text="sum of the differences of these ways from one landing to the next"
     )
     worst_place_error = Field(unit="m", text="the largest so far")
     place_errors = Field(unit="m", text="their sum")
@@ -75,15 +75,15 @@ class CourseCriteria(StandCriteria):
         0.06, unit="s", gt=0, text="all points must be off the ground for so long in a jump"
     )
     measure_time: float = parameter(
-        0.35, unit="s", gt=0, text="how long after touchdown the place is measured"
+        0.35, unit="s", gt=0, text="time after touchdown at which the place is measured"
     )
     rest_time: float = parameter(
-        1.5, unit="s", gt=0, text="how long after the last touchdown the rest is judged"
+        1.5, unit="s", gt=0, text="time after the last touchdown at which the rest is judged"
     )
 
 
 class CourseEnding(IntEnum):
-    """Why the run should end."""
+    """Reason to end the run."""
 
     NONE = 0
     FELL = 1
@@ -91,9 +91,9 @@ class CourseEnding(IntEnum):
 
 
 class CourseEnd(Signal):
-    """What a tick asks for."""
+    """Result of a tick."""
 
-    ending = Field(dtype="int64", values=CourseEnding, text="why the run should end")
+    ending = Field(dtype="int64", values=CourseEnding, text="reason to end the run")
 
 
 class CourseScore(Block):
@@ -119,8 +119,8 @@ class CourseScore(Block):
     params: CourseCriteria
     constants: StandConstants
     scratch: CourseEnd
-    truth = Input(RobotTruth, reads_truth=True, text="what the simulator knows")
-    goal = Input(CourseGoal, text="where the feet should be by all commands so far")
+    truth = Input(RobotTruth, reads_truth=True, text="true state of the robot")
+    goal = Input(CourseGoal, text="goal of the feet by all commands so far")
     wbc = Input(WholeBodyCommand, default={}, text="the controller's answers, to count failures")
     record = State(CourseRecord, text="everything the judgement needs")
 
@@ -172,7 +172,7 @@ class CourseScore(Block):
         self.request_stop("the robot fell" if fell else f"{int(self.record.jumps)} jumps are over")
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The judgement and its figures."""
+        """Return the judgement and its figures."""
         r = self.record
         if r.ticks == 0:
             return {"success": False, "reason": "the run had no ticks"}

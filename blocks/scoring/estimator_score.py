@@ -41,7 +41,7 @@ class EstimatorRecord(Signal):
 
 
 class EstimatorScratch(Signal):
-    """What a tick computes on its way."""
+    """Intermediate values of a tick."""
 
     error = Field(3, text="of a position, a velocity or an orientation")
     squares = Field(KINDS, text="of the errors of the tick")
@@ -75,8 +75,8 @@ class EstimatorScore(Block):
 
     Scratch = EstimatorScratch
     params: Params
-    truth = Input(RobotTruth, reads_truth=True, text="what the simulator knows")
-    base = Input(BaseState, text="what the estimator says")
+    truth = Input(RobotTruth, reads_truth=True, text="true state of the robot")
+    base = Input(BaseState, text="estimate of the base")
     record = State(EstimatorRecord, text="the errors so far")
 
     @kernel
@@ -117,7 +117,7 @@ class EstimatorScore(Block):
         record.touchdown[:] = errors
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The errors by name."""
+        """Return the errors by name."""
         record = self.record
         ticks, values = int(record.ticks), dict[str, Metric]()
         values["estimator_flights"] = int(record.flights)
@@ -144,7 +144,7 @@ class EstimatorScore(Block):
 def find_errors(
     truth: RobotTruth, base: BaseState, record: EstimatorRecord, scratch: EstimatorScratch
 ) -> None:
-    """The errors of this tick, into ``record.last``."""
+    """Find the errors of this tick, into ``record.last``."""
     error, turn = scratch.error, scratch.turn
     error[:] = base.position - truth.base_position
     record.last[0] = magnitude(error)
@@ -160,7 +160,7 @@ def find_errors(
 
 @kernel
 def is_flight(record: EstimatorRecord, confirmation: float, period: float) -> bool:
-    """Whether the robot has been unloaded for long enough that this is a flight."""
+    """Check whether the robot has been unloaded for long enough that this is a flight."""
     return bool(record.unloaded_ticks * period >= confirmation - 1e-9)
 
 

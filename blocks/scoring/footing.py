@@ -28,7 +28,7 @@ class BallFeet(NamedTuple):
         foot, radius, size: of each its index, its radius [m], and the number of joints of the limb that
             it ends, (n,) each; a limb has at most m joints.
         joints, links, tip: of each limb as ``Limb`` has them, (n, m), (n, m, 7), (n, 7).
-        angles, anchors, pose, axis: room for the joints of a limb (m,) and (m, 6), for the pose of the
+        angles, anchors, pose, axis: memory for the joints of a limb (m,) and (m, 6), for the pose of the
             foot (4, 3) and for one of its axes in the world (3,).
     """
 
@@ -61,11 +61,11 @@ class Footing:
 
     @property
     def load_share(self) -> float:
-        """By default the least share of the weight on each foot at rest."""
+        """The default of the least share of the weight on each foot at rest."""
         return LOAD_SHARE / len(self._robot.feet)
 
     def ball_feet(self) -> BallFeet:
-        """The feet that are balls."""
+        """Return the feet that are balls."""
         balls = ball_feet(self._robot)
         limbs = [read_limb(self._robot, ball.foot) for ball in balls]
         n, m = len(balls), max((len(limb.joints) for limb in limbs), default=0)
@@ -86,7 +86,7 @@ class Footing:
 
 @kernel
 def points_of(foot_of_point: Indices1D, foot: int) -> int:
-    """The number of contact points of a foot."""
+    """Count the contact points of a foot."""
     count = 0
     for point in range(foot_of_point.shape[0]):
         if foot_of_point[point] == foot:
@@ -172,7 +172,7 @@ def add_roll(
 
 @kernel
 def points_missing(foot_of_point: Indices1D, touched: Flags1D, feet: int) -> int:
-    """The number of further points that must carry load for every sole to be flat.
+    """Count the further points that must carry load for every sole to be flat.
 
     A point or line foot needs all of its points, a foot with more points needs three.
     """
@@ -188,7 +188,7 @@ def points_missing(foot_of_point: Indices1D, touched: Flags1D, feet: int) -> int
 
 @kernel
 def least_load(foot_of_point: Indices1D, force: Array2D, feet: int, weight: float) -> float:
-    """The least loaded foot's share of the ``weight`` [N]; ``force`` on each point [N, world]."""
+    """Return the least loaded foot's share of the ``weight`` [N]; ``force`` on each point [N, world]."""
     least = 0.0
     for foot in range(feet):
         load = 0.0
@@ -202,7 +202,7 @@ def least_load(foot_of_point: Indices1D, force: Array2D, feet: int, weight: floa
 
 @kernel
 def any_loaded(touched: Flags1D) -> bool:
-    """Whether any contact point carries load."""
+    """Check whether any contact point carries load."""
     found = False
     for point in range(touched.shape[0]):
         found = found or bool(touched[point])
@@ -211,5 +211,5 @@ def any_loaded(touched: Flags1D) -> bool:
 
 @kernel
 def magnitude(vector: Vector3) -> float:
-    """The Euclidean norm of a vector."""
+    """Return the Euclidean norm of a vector."""
     return sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])

@@ -1,4 +1,4 @@
-"""When a jump, or a row of jumps, counts as a success: its record, tolerances and judgement.
+"""The record, tolerances and judgement of the success of a jump, or a row of jumps.
 
 The last jump of a row is judged like any jump; those before it by their flight, their lift-off speed,
 their apex and where they land.
@@ -31,24 +31,24 @@ class JumpRecord(StandRecord):
     """Everything about one jump that the judgement needs; instants are ``NEVER`` before they
     come."""
 
-    unloaded_time = Field(unit="s", text="when all points were last found unloaded anew")
+    unloaded_time = Field(unit="s", text="time at which all points were last found unloaded anew")
     unloaded_speed = Field(unit="m/s", text="vertical speed of the com at that time")
     unloaded_momentum = Field(3, unit="N m s", frame="world", text="k about the com at that time")
-    lift_off_time = Field(unit="s", text="when the flight began")
+    lift_off_time = Field(unit="s", text="start of the flight")
     lift_off_speed = Field(unit="m/s", text="vertical speed of the com at that time")
     lift_off_momentum = Field(3, unit="N m s", frame="world", text="k about the com at that time")
-    touchdown_time = Field(unit="s", text="when the flight ended")
+    touchdown_time = Field(unit="s", text="end of the flight")
     touchdown_speed = Field(unit="m/s", text="downward speed of the com just before")
     vertical_speed = Field(unit="m/s", text="vertical speed of the com in the tick before")
     squat_height = Field(unit="m", text="lowest height of the com before lift-off")
     apex_height = Field(unit="m", text="greatest height of the com since lift-off")
     start_foot = Field(("n_feet", 2), unit="m", text="middle of every foot at the start")
-    start_direction = Field(("n_feet", 2), unit="m", text="where it points then")
+    start_direction = Field(("n_feet", 2), unit="m", text="direction of each foot then")
     ground_low = Field(unit="m", text="lowest ground under a contact point, when judged")
     ground_high = Field(unit="m", text="highest ground under a contact point, when judged")
     planned_flight = Field(unit="s", text="flight time of the reference")
     planned_speed = Field(unit="m/s", text="vertical com speed of the reference at lift-off")
-    planned_speed_time = Field(unit="s", text="when that speed was read")
+    planned_speed_time = Field(unit="s", text="time at which that speed was read")
     planned_standing = Field(unit="m", text="com height of the reference at the start")
     planned_apex = Field(unit="m", text="greatest com height of the reference")
     planned_start = Field(("n_feet", 2), unit="m", text="feet of the reference at the start")
@@ -61,7 +61,7 @@ class JumpSeries(Signal):
     """The jumps of a row that are over. Every figure is that of the worst of these jumps."""
 
     made = Field(dtype="int64", text="number of jumps that have touched down")
-    landed_time = Field(unit="s", text="when the last of them touched down")
+    landed_time = Field(unit="s", text="time at which the last of them touched down")
     planned_lift_off = Field(unit="s", text="the planned lift-off of the jump under way or next")
     flight_share = Field(unit="", text="least share of the planned flight time")
     flight_jump = Field(dtype="int64", text="number of that jump, from 1")
@@ -82,7 +82,7 @@ class JumpSeries(Signal):
 class JumpCriteria(StandCriteria):
     """The tolerances of a successful jump. Targets that are not given are the reference's."""
 
-    jumps: int = parameter(1, ge=1, text="how many jumps in a row, each with its own flight")
+    jumps: int = parameter(1, ge=1, text="number of jumps in a row, each with its own flight")
     series_distance_tolerance: float = parameter(
         0.03, unit="m", gt=0, text="of the feet after every jump of a row but the last"
     )
@@ -96,8 +96,7 @@ class JumpCriteria(StandCriteria):
     )
     ground_tolerance: float = parameter(
         0.0, unit="m", ge=0,
-        text="how far the ground under a contact point may be above or below that height; or "
-        "{from: robot.ground_tolerance}, as uneven as the simulator's scene is",
+        text="largest distance of the ground under a contact point from that height; or {from: robot.ground_tolerance}, as uneven as the simulator's scene is",
     )  # fmt: skip
     flight_confirmation: float = parameter(
         0.02, unit="s", gt=0, text="all points unloaded for this long is a flight"
@@ -113,19 +112,19 @@ class JumpCriteria(StandCriteria):
 
 
 def feet_moved(record: JumpRecord) -> tuple[float, float]:
-    """How far the feet are from where they started [m], forward and left, on average."""
+    """Return the way of the feet from where they started [m], forward and left, on average."""
     moved = (record.foot - record.start_foot).mean(axis=0)
     return float(moved[0]), float(moved[1])
 
 
 def feet_turned(record: JumpRecord) -> float:
-    """How far the feet have turned since the start [rad], to the left, on average."""
+    """Return the turn of the feet since the start [rad], to the left, on average."""
     return mean_turn(record.start_direction, record.direction)
 
 
 @kernel
 def mean_turn(start: Array2D, now: Array2D) -> float:
-    """The mean angle [rad] from each row of ``start`` (n, 2) to that of ``now``, to the left.
+    """Return the mean angle [rad] from each row of ``start`` (n, 2) to that of ``now``, to the left.
 
     Half a turn is the same to the left and to the right, so all angles count as within half a turn
     of the first.
@@ -147,7 +146,7 @@ def mean_turn(start: Array2D, now: Array2D) -> float:
 
 
 def first_failure(record: JumpRecord, limits: JumpCriteria, planned: bool) -> str | None:
-    """The first criterion that does not hold, in words with figures, or ``None``."""
+    """Return the first criterion that does not hold, in words with figures, or ``None``."""
     return next((text for holds, text in _judge(record, limits, planned) if not holds), None)
 
 
@@ -187,7 +186,7 @@ def _judge(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[Verdict]:
 
 
 def _judge_task(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[Verdict]:
-    """The criteria of the task: where it should have jumped, how high, how far round."""
+    """Yield the criteria of the task: where it should have jumped, how high, how far round."""
     rise = float(r.apex_height - r.standing_height)
     target = c.rise
     if target is None and planned:
@@ -238,7 +237,7 @@ def _judge_task(r: JumpRecord, c: JumpCriteria, planned: bool) -> Iterator[Verdi
 
 
 def series_failure(series: JumpSeries, limits: JumpCriteria, made: int) -> str | None:
-    """The first criterion of a row of jumps that does not hold, in words, or ``None``.
+    """Return the first criterion of a row of jumps that does not hold, in words, or ``None``.
 
     ``made`` is the number of jumps that are over, including the last.
     """

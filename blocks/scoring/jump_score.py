@@ -1,4 +1,4 @@
-"""The one judge of jumps: success by fixed criteria, from what only a simulator knows."""
+"""The one judge of jumps: success by fixed criteria, from the simulator's true state."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ EARLY_LIFT_OFF = 0.1
 
 
 class Ending(IntEnum):
-    """Why a judge asks for the end of the run."""
+    """Reason of a judge to end the run."""
 
     NONE = 0
     FELL = 1
@@ -52,16 +52,16 @@ class Ending(IntEnum):
 
 
 class JumpConstants(StandConstants):
-    """What the record of a jump needs to know beside its tolerances."""
+    """Constants of a jump's record, beside its tolerances."""
 
     planned = Field(dtype="bool", text="there is a reference to compare the jump with")
 
 
 class RunEnd(Signal):
-    """What a tick asks for."""
+    """Result of a tick."""
 
-    ending = Field(dtype="int64", values=Ending, text="why the run should end; see Ending")
-    landed = Field(unit="s", text="how long after touchdown that is")
+    ending = Field(dtype="int64", values=Ending, text="reason to end the run; see Ending")
+    landed = Field(unit="s", text="time after touchdown at which it ends")
 
 
 class JumpScore(Block):
@@ -88,7 +88,7 @@ class JumpScore(Block):
        every contact point above ground of the ``landing_height``. Targets are the parameters
        ``rise``, ``distance`` and ``yaw``, else the reference's, and without either not judged.
 
-    On ground that is not as level as the task says (``ground_tolerance``) these differ. The simulator lets soles
+    On ground that is not as level as that of the task (``ground_tolerance``) these differ. The simulator lets soles
     of several points touch the ground between these points, and counts that in its metric
     ``robot_sole_contacts``. Load there is not measured, so rest (6) is judged by what the robot does: tilt
     and speeds; soles need not be flat, and neither load share nor support count. A foot without a loaded point
@@ -117,7 +117,7 @@ class JumpScore(Block):
     params: JumpCriteria
     constants: JumpConstants
     scratch: RunEnd
-    truth = Input(RobotTruth, reads_truth=True, text="what the simulator knows")
+    truth = Input(RobotTruth, reads_truth=True, text="true state of the robot")
     reference = Input(JumpReference, default={}, text="the planned jump, for its targets")
     wbc = Input(WholeBodyCommand, default={}, text="the controller's answers, to count failures")
     record = State(JumpRecord, text="everything the judgement needs")
@@ -181,7 +181,7 @@ class JumpScore(Block):
         )
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The judgement and its figures."""
+        """Return the judgement and its figures."""
         record = self.record
         if record.ticks == 0:
             waits = self.constants.planned and self.reference.time < 0.0
@@ -285,9 +285,9 @@ def record_flight(
     constants: JumpConstants,
     bounces: bool,
 ) -> None:
-    """Lift-off, apex and touchdown, by the simulator's contacts.
+    """Record lift-off, apex and touchdown, by the simulator's contacts.
 
-    ``bounces`` says that a foot off the ground would be no lift-off: it is between two jumps.
+    ``bounces`` means that a foot off the ground would be no lift-off: it is between two jumps.
     """
     height, now, loaded = truth.com[2], record.now, any_loaded(truth.contact_touched)
     if record.lift_off_time == NEVER:
@@ -375,8 +375,8 @@ def record_jump(
 ) -> None:
     """Record a jump of a row that has touched down, and prepare for the next lift-off.
 
-    ``planned`` says that there is a reference to compare the jump with. All but the first may lift off from
-    ground that is higher or lower than the task says, and all may land there.
+    ``planned`` means that there is a reference to compare the jump with. All but the first may lift off from
+    ground that is higher or lower than that of the task, and all may land there.
     """
     made = series.made + 1
     series.made = made
@@ -408,7 +408,7 @@ def record_jump(
 
 @kernel
 def compare_place(record: JumpRecord, series: JumpSeries) -> None:
-    """How far the feet are from their planned positions and headings, between two jumps."""
+    """Compare the feet with their planned positions and headings, between two jumps."""
     x, y, feet = 0.0, 0.0, record.foot.shape[0]
     for k in range(feet):
         moved = record.foot[k, 0] - record.start_foot[k, 0]
@@ -424,7 +424,7 @@ def compare_place(record: JumpRecord, series: JumpSeries) -> None:
 
 @kernel
 def keep_place(series: JumpSeries) -> None:
-    """When the next jump lifts off: keep the last landing's error if it is the largest."""
+    """Keep the last landing's error if it is the largest, when the next jump lifts off."""
     keep_worst(series.place_error, series.place_jump, series.place_now, series.made)
     keep_worst(series.turn_error, series.turn_jump, series.turn_now, series.made)
 

@@ -29,7 +29,7 @@ class ObservedCriteria(Parameters):
 
     judge_time: float | None = parameter(
         None, unit="s", gt=0.0,
-        text="when the rest is judged, by the plan's time; none: `rest_time` after its touchdown",
+        text="time at which the rest is judged, by the plan's time; none: `rest_time` after its touchdown",
     )  # fmt: skip
     rest_time: float = parameter(1.5, unit="s", gt=0.0, text="from touchdown to rest")
     peak_tilt: float = parameter(
@@ -41,25 +41,25 @@ class ObservedCriteria(Parameters):
         0.6, ge=0.0, le=1.0, text="least share of the planned flight with all switches open"
     )
     squat_depth: float = parameter(
-        0.0, unit="m", ge=0.0, le=0.5, text="how far the com should go down; zero: not judged"
+        0.0, unit="m", ge=0.0, le=0.5, text="nominal descent of the com; zero: not judged"
     )
     depth_tolerance: float = parameter(0.25, ge=0.0, text="of that depth, as a share of it")
 
 
 class ObservedRecord(Signal):
-    """What the judgement needs."""
+    """Record for the judgement."""
 
-    begun = Field(dtype="bool", text="whether the plan has begun")
-    faulted = Field(dtype="bool", text="whether the phase was FAULT")
-    flight = Field(unit="s", text="how long no switch was closed in flight")
-    planned_flight = Field(unit="s", text="how long the plan's flight lasts")
+    begun = Field(dtype="bool", text="the plan has begun")
+    faulted = Field(dtype="bool", text="the phase was FAULT")
+    flight = Field(unit="s", text="time without a closed switch in flight")
+    planned_flight = Field(unit="s", text="duration of the plan's flight")
     height = Field(unit="m", text="of the com as the plan began")
     lowest = Field(unit="m", text="of the com, the least so far before a flight")
     peak_tilt = Field(unit="rad", text="in standing and landing, so far")
     judged = Field(unit="s", text="plan time of the judgement; negative: not yet")
     rest_tilt = Field(unit="rad", text="then")
     rest_speed = Field(unit="m/s", text="of the com, then")
-    rest_contacts = Field(dtype="int64", text="how many points carried load then")
+    rest_contacts = Field(dtype="int64", text="number of points that carried load then")
 
 
 class ObservedScore(Block):
@@ -84,7 +84,7 @@ class ObservedScore(Block):
     needs = ("floating base", "feet")
     base = Input(BaseState, text="the estimated base")
     terms = Input(DynamicsTerms, text="the estimated com")
-    contacts = Input(ContactState, text="which points carry load")
+    contacts = Input(ContactState, text="points that carry load")
     phase = Input(PhaseState, text="the phase")
     reference = Input(JumpReference, text="the plan")
     record = State(ObservedRecord, text="everything the judgement needs")
@@ -147,7 +147,7 @@ class ObservedScore(Block):
         self.request_stop(f"judged at {self.time:.2f} s")
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The judgement and its figures."""
+        """Return the judgement and its figures."""
         record = self.record
         failure = next((text for holds, text in self._judge() if not holds), None)
         return {

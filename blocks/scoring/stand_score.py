@@ -36,7 +36,7 @@ SETTLING = 0.15
 
 
 class SquatRecord(StandRecord):
-    """What the judgement of a stance or a squat needs."""
+    """Record for the judgement of a stance or a squat."""
 
     lowest_height = Field(unit="m", text="least height of the com so far")
     planned_standing = Field(unit="m", text="com height of the reference at the start")
@@ -47,13 +47,13 @@ class SquatCriteria(StandCriteria):
     """The tolerances of a successful stance or squat."""
 
     judge_time: float = parameter(
-        3.0, unit="s", gt=0, text="when the rest is judged, and the run ends"
+        3.0, unit="s", gt=0, text="time at which the rest is judged, and the run ends"
     )
     settle_time: float = parameter(
         0.3, unit="s", ge=0, text="the robot may settle on the ground for so long"
     )
     squat_depth: float | None = parameter(
-        None, unit="m", ge=0, text="how far the com should go down; by default as the reference"
+        None, unit="m", ge=0, text="nominal descent of the com; by default as the reference"
     )
     depth_tolerance: float = parameter(0.1, ge=0, text="of that depth, as a share of it")
 
@@ -85,7 +85,7 @@ class StandScore(Block):
     needs = ("floating base", "feet")
     params: SquatCriteria
     constants: StandConstants
-    truth = Input(RobotTruth, reads_truth=True, text="what the simulator knows")
+    truth = Input(RobotTruth, reads_truth=True, text="true state of the robot")
     reference = Input(JumpReference, default={}, text="the planned squat, for its depth")
     wbc = Input(WholeBodyCommand, default={}, text="the controller's answers, to count failures")
     record = State(SquatRecord, text="everything the judgement needs")
@@ -133,7 +133,7 @@ class StandScore(Block):
         self.request_stop("the robot fell" if fell else f"judged at {self.time:.2f} s")
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The judgement and its figures."""
+        """Return the judgement and its figures."""
         record = self.record
         if record.ticks == 0:
             return {"success": False, "reason": "the run had no ticks"}

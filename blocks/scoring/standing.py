@@ -1,4 +1,4 @@
-"""How a robot stands on its feet: what all scores record, their tolerances, judgement and metrics."""
+"""A robot's standing on its feet: the record that all scores share, their tolerances, judgement and metrics."""
 
 from __future__ import annotations
 
@@ -27,34 +27,36 @@ from .footing import (
 NEVER = -1.0
 """The value of a time that has not come yet."""
 Verdict = tuple[Any, str]
-"""Whether a criterion holds (as Python's or NumPy's bool), and the reason if it does not."""
+"""The outcome of a criterion (Python's or NumPy's bool), and the reason if it does not hold."""
 
 
 class StandRecord(Signal):
-    """What a judgement needs of a robot on its feet; instants are ``NEVER`` before they come."""
+    """Record for the judgement of a robot on its feet; instants are ``NEVER`` before they come."""
 
     now = Field(unit="s", text="time since the start")
     ticks = Field(dtype="int64", text="ticks recorded")
-    fall_time = Field(unit="s", text="when the robot fell")
+    fall_time = Field(unit="s", text="time of the fall")
     fall_tilt = Field(unit="rad", text="tilt then")
     fall_height = Field(unit="m", text="height of the base above the ground then")
     standing_height = Field(unit="m", text="height of the com at the start")
     foot = Field(("n_feet", 2), unit="m", text="middle of every foot now")
-    direction = Field(("n_feet", 2), unit="m", text="where it points now")
+    direction = Field(("n_feet", 2), unit="m", text="direction of each foot now")
     turned = Field(("n_feet", 3, 3), text="axes of every ball foot in the world, one a row")
-    rolled = Field(("n_feet", 2), unit="m", text="how far every ball foot has rolled")
+    rolled = Field(("n_feet", 2), unit="m", text="way that every ball foot has rolled")
     landed_foot = Field(
         ("n_feet", 2),
         unit="m",
-        text="where every foot was when it should stay, less what it rolled",
+        text="place of every foot when it should stay, less what it rolled",
     )
     foot_slip = Field(unit="m", text="farthest that a foot's middle has moved since then")
-    lifted_time = Field("n_feet", unit="s", text="for how long each foot has carried no load")
+    lifted_time = Field("n_feet", unit="s", text="time for which each foot has carried no load")
     steps = Field(dtype="int64", text="steps that feet have taken while they should stand")
-    step_end = Field("n_feet", unit="s", text="when each foot last carried no load in a step")
+    step_end = Field(
+        "n_feet", unit="s", text="time at which each foot last carried no load in a step"
+    )
     longest_lift = Field(unit="s", text="longest time that was, while it should stand")
     peak_tilt = Field(unit="rad", text="greatest tilt while it should stand")
-    judged_time = Field(unit="s", text="when the rest was judged")
+    judged_time = Field(unit="s", text="time at which the rest was judged")
     tilt = Field(unit="rad", text="tilt, when judged")
     com_speed = Field(unit="m/s", text="speed of the com, when judged")
     angular_speed = Field(unit="rad/s", text="of the base, when judged")
@@ -64,7 +66,7 @@ class StandRecord(Signal):
         dtype="int64", text="contact points that should be loaded and are not, when judged"
     )
     forbidden = Field(dtype="int64", text="physics steps with a forbidden contact")
-    forbidden_time = Field(unit="s", text="when the first one was")
+    forbidden_time = Field(unit="s", text="time of the first one")
     violation = Field(unit="rad", text="largest excess over a joint limit")
     overload = Field(unit="N m", text="largest excess of a motor torque over its limit")
     peak_torque = Field(unit="N m", text="largest motor torque")
@@ -107,7 +109,7 @@ class StandCriteria(Parameters):
     )
 
     def for_robot(self, footing: Footing) -> StandCriteria:
-        """The tolerances, in which those that are not given follow from the robot."""
+        """Return the tolerances, in which those that are not given follow from the robot."""
         given: dict[str, float] = {}
         if self.fall_height is None:
             given["fall_height"] = footing.fall_height
@@ -117,7 +119,7 @@ class StandCriteria(Parameters):
 
 
 class StandConstants(Signal):
-    """What the record of a robot on its feet needs to know of it."""
+    """Constants of a standing robot's record."""
 
     foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
     weight = Field(unit="N", text="of the robot")
@@ -195,7 +197,7 @@ def record_feet(
     constants: StandConstants,
     stay: bool,
 ) -> None:
-    """How far feet slide and how long they are off the ground, from when they should ``stay``.
+    """Record how far feet slide and how long they are off the ground, from when they should ``stay``.
 
     A foot that is off the ground for longer than a step takes has stepped, if it may. Then it may
     move until it has been on the ground for ``constants.settling``.
@@ -215,7 +217,7 @@ def record_foot(
     constants: StandConstants,
     foot: int,
 ) -> None:
-    """How far a foot that should stay slides, and how long it is off the ground.
+    """Record how far a foot that should stay slides, and how long it is off the ground.
 
     On uneven ground a foot none of whose points is loaded may stand on an edge between them: it is off the
     ground if all its points are higher above it than ``constants.clearance``.
@@ -264,7 +266,7 @@ def record_rest(truth: RobotTruth, record: StandRecord, constants: StandConstant
 
 @kernel
 def largest_of(values: Array1D) -> float:
-    """The largest of at least one value, (n,)."""
+    """Return the largest of at least one value, (n,)."""
     largest = values[0]
     for k in range(1, values.shape[0]):
         largest = max(largest, values[k])
@@ -273,7 +275,7 @@ def largest_of(values: Array1D) -> float:
 
 @kernel
 def largest_magnitude(values: Array1D) -> float:
-    """The largest magnitude of at least one value, (n,)."""
+    """Return the largest magnitude of at least one value, (n,)."""
     largest = abs(values[0])
     for k in range(1, values.shape[0]):
         largest = max(largest, abs(values[k]))
@@ -281,7 +283,7 @@ def largest_magnitude(values: Array1D) -> float:
 
 
 def judge_safety(r: StandRecord, c: StandCriteria) -> Iterator[Verdict]:
-    """It does not fall, and nothing but its contact points touches."""
+    """Judge that it does not fall, and nothing but its contact points touches."""
     yield (
         r.fall_time == NEVER,
         (
@@ -308,9 +310,9 @@ def judge_machine(r: StandRecord, c: StandCriteria) -> Iterator[Verdict]:
 def judge_rest(
     r: StandRecord, c: StandCriteria, since: str, *, level: bool = True
 ) -> Iterator[Verdict]:
-    """It stayed upright, and in the end it is still and stands on all its feet.
+    """Judge that it stayed upright, and in the end is still and stands on all its feet.
 
-    ``since`` says from when on it should stand, such as "after touchdown". On ground that is not ``level``
+    ``since`` names the time from which it should stand, such as "after touchdown". On ground that is not ``level``
     a sole may carry load between its contact points, where nothing measures it; there only what the
     robot does counts.
     """
@@ -383,7 +385,7 @@ def judgement_metrics(record: StandRecord, failure: str | None) -> dict[str, Met
 
 
 def rest_metrics(record: StandRecord) -> dict[str, Metric]:
-    """How the robot stood when its rest was judged."""
+    """Return the figures of the robot's stance when its rest was judged."""
     return {
         "final_tilt_deg": degrees(record.tilt),
         "final_com_speed_m_s": float(record.com_speed),

@@ -11,21 +11,21 @@ from ...runtime.language.signals import Field, Signal
 
 
 class ContactState(Signal):
-    """Which contact points carry load, after debouncing."""
+    """Contact points that carry load, after debouncing."""
 
-    active = Field("n_contacts", dtype="bool", text="whether each point is in contact")
+    active = Field("n_contacts", dtype="bool", text="each point is in contact")
 
 
 class FootLoad(Signal):
-    """What the torques of the legs say of the load on each foot."""
+    """Load on each foot, by the torques of the legs."""
 
     force = Field("n_feet", unit="N", text="upward force on each foot")
-    centre = Field(("n_feet", 3), unit="m", frame="world", text="where it acts on the sole")
-    loaded = Field("n_feet", dtype="bool", text="whether the foot carries load")
+    centre = Field(("n_feet", 3), unit="m", frame="world", text="place on the sole where it acts")
+    loaded = Field("n_feet", dtype="bool", text="the foot carries load")
 
 
 class SwitchFault(IntEnum):
-    """What is wrong with a foot switch."""
+    """Fault of a foot switch."""
 
     NONE = 0
     """Nothing was noticed."""
@@ -40,7 +40,7 @@ class SwitchFault(IntEnum):
 
 
 class SwitchHealth(Signal):
-    """Which foot switches are not to be believed now, and whether the robot should stop for that."""
+    """Foot switches that are not to be believed now, and whether the robot should stop for that."""
 
     fault = Field("n_contacts", dtype="int64", values=SwitchFault, text="see SwitchFault")
     stop = Field(dtype="bool", text="one of them is at fault, and the robot is not in the air")
@@ -56,7 +56,7 @@ class BaseState(Signal):
 
 
 class MotorCondition(Signal):
-    """What motors and pack are like now. Shares are of what the description says, in the motors' order."""
+    """Present condition of motors and pack. Shares are of the description's values, in the motors' order."""
 
     torque_constant = Field("n_joints", text="share of the torque constant")
     corner_speed = Field("n_joints", text="share of the speed up to which there is peak torque")
@@ -65,11 +65,11 @@ class MotorCondition(Signal):
     pack_resistance = Field(unit="ohm", text="of the pack and its leads")
 
 
-class PlaceMeasurement(Signal):
-    """Where the base is, as seen from outside."""
+class PoseMeasurement(Signal):
+    """Place of the base, as measured from outside."""
 
     number = Field(dtype="int64", text="counts the measurements, from 1; zero: none yet")
-    time = Field(unit="s", text="when it was taken")
+    time = Field(unit="s", text="time of the measurement")
     position = Field(3, unit="m", frame="world", text="base origin")
     heading = Field(unit="rad", frame="world", text="heading of the base")
 
@@ -91,7 +91,7 @@ class EstimatorHealth(Signal):
 
 
 class MassEstimate(Signal):
-    """What the robot weighs and where, as its model should have it."""
+    """Mass of the robot and its place, as its model should have them."""
 
     mass = Field(unit="kg", text="mass of the robot; zero where it is not known")
     mass_std = Field(unit="kg", text="standard deviation of its error")
@@ -104,8 +104,8 @@ class DelayEstimate(Signal):
 
     delay = Field(unit="s", text="the delay to compensate")
     measured = Field(unit="s", text="as measured; zero while it is not known")
-    known = Field(dtype="bool", text="whether it has been measured")
-    ahead = Field(unit="s", text="how far ahead of time the controller works")
+    known = Field(dtype="bool", text="it has been measured")
+    ahead = Field(unit="s", text="lead time of the controller")
 
 
 class DynamicsTerms(Signal):
@@ -153,7 +153,7 @@ class WholeBodyTarget(Signal):
 
 
 class PointTarget(Signal):
-    """Where a point of the robot should be at the present instant."""
+    """Target of a point of the robot at the present instant."""
 
     position = Field(3, unit="m", frame="world", text="place of the point")
     velocity = Field(3, unit="m/s", frame="world", text="its velocity")
@@ -166,12 +166,12 @@ class WholeBodyCommand(Signal):
     torque = Field("n_joints", unit="N m", text="feedforward joint torques")
     acceleration = Field("n_velocities", text="generalised acceleration")
     force = Field(("n_contacts", 3), unit="N", frame="world", text="contact forces on the robot")
-    solved = Field(dtype="bool", text="whether the quadratic program was solved")
+    solved = Field(dtype="bool", text="the quadratic program was solved")
     failures = Field(dtype="int64", text="solver failures so far")
 
 
 class FootTarget(Signal):
-    """Where the feet should be, seen from the base: the landing controller's output."""
+    """Targets of the feet, seen from the base: the landing controller's output."""
 
     position = Field(("n_feet", 3), unit="m", frame="body", text="sole centres")
     velocity = Field(("n_feet", 3), unit="m/s", frame="body", text="their velocities")
@@ -184,7 +184,7 @@ class JointTarget(Signal):
 
     position = Field("n_joints", unit="rad", text="joint angles")
     velocity = Field("n_joints", unit="rad/s", text="joint velocities")
-    reachable = Field("n_feet", dtype="bool", text="whether the leg reaches the foot's target")
+    reachable = Field("n_feet", dtype="bool", text="the leg reaches the foot's target")
 
 
 class JointTorque(Signal):

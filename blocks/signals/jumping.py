@@ -5,23 +5,8 @@ Units, frames and orders are those of the package ``signals``.
 
 from __future__ import annotations
 
-from enum import IntEnum
-
+from ...planner.task.phase import Phase
 from ...runtime.language.signals import Field, Signal
-
-
-class Phase(IntEnum):
-    """What the robot is doing, in the order of a jump."""
-
-    HANG = -1
-    """It hangs in a gantry, or is put down, and does not carry itself yet."""
-    STAND = 0
-    SQUAT = 1
-    THRUST = 2
-    FLIGHT = 3
-    LANDING = 4
-    RECOVER = 5
-    FAULT = 6
 
 
 class JumpReference(Signal):
@@ -41,10 +26,10 @@ class JumpReference(Signal):
     )
     angular_momentum = Field(3, unit="N m s", frame="world", text="k about the com")
     angular_momentum_rate = Field(3, unit="N m", frame="world", text="its rate")
-    contact = Field("n_contacts", dtype="bool", text="which points are planned to carry load")
+    contact = Field("n_contacts", dtype="bool", text="points that are planned to carry load")
     toes_first = Field(
         dtype="bool",
-        text="whether the flight under way or next ends on some of the points only, such as the toes",
+        text="the flight under way or next ends on some of the points only, such as the toes",
     )
     foot_position = Field(("n_feet", 3), unit="m", frame="world", text="sole centres")
     foot_velocity = Field(("n_feet", 3), unit="m/s", frame="world", text="their velocities")
@@ -66,5 +51,5 @@ class PhaseState(Signal):
     stance = Field("n_contacts", dtype="bool", text="points the controller may push with")
     stepping = Field("n_contacts", dtype="bool", text="points of a foot that takes a step")
     step_acceleration = Field(
-        ("n_contacts", 3), unit="m/s^2", frame="world", text="what these points should do"
+        ("n_contacts", 3), unit="m/s^2", frame="world", text="planned acceleration of these points"
     )

@@ -12,7 +12,7 @@ from ...runtime.language.signals import Field, Signal
 
 
 class CommandMode(IntEnum):
-    """What a drive does with a joint command."""
+    """Response of a drive to a joint command."""
 
     OFF = 0
     """No torque."""
@@ -30,7 +30,7 @@ class ImuReading(Signal):
 
 
 class JointState(Signal):
-    """What the joint encoders and drives report.
+    """Measurements of the joint encoders and drives.
 
     A field has one unit. In all arrays with an element for each joint it is that of joints that turn; the
     element of a joint that slides is in m for rad, m/s for rad/s and N for N m.
@@ -44,11 +44,11 @@ class JointState(Signal):
 class ContactSwitches(Signal):
     """The raw tactile switches under the feet."""
 
-    closed = Field("n_contacts", dtype="bool", text="whether each switch is pressed")
+    closed = Field("n_contacts", dtype="bool", text="each switch is pressed")
 
 
 class DrivePhase(IntEnum):
-    """What a real robot does with its drives."""
+    """Phase of a real robot's drives."""
 
     OFF = 0
     """Only watched: they were never enabled, or are off again."""
@@ -59,7 +59,7 @@ class DrivePhase(IntEnum):
     DRIVING = 3
     """They follow the commands."""
     DAMPED = 4
-    """In damping, and until the end of the run."""
+    """The drives are damped until the end of the run."""
 
 
 HEALTHY = 0x80
@@ -90,29 +90,29 @@ CONDITIONS = (
 
 
 def drive_conditions(error_byte: int) -> tuple[DriveCondition, ...]:
-    """What an error byte reports; nothing where the actuator is healthy."""
+    """Return the conditions that an error byte reports; none where the actuator is healthy."""
     return tuple(c for c in CONDITIONS if error_byte & 1 << c.bit)
 
 
 def is_critical(error_byte: int) -> bool:
-    """Whether the actuator has switched its torque off, or its reply is no reply at all."""
+    """Check whether the actuator has switched its torque off, or its reply is no reply at all."""
     return not error_byte & HEALTHY or any(c.critical for c in drive_conditions(error_byte))
 
 
 def describe_conditions(error_byte: int) -> str:
-    """The conditions in words; empty where the actuator is healthy."""
+    """Name the conditions in words; empty where the actuator is healthy."""
     if not error_byte & HEALTHY:
         return f"its error byte is {error_byte:#04x}, whose highest bit should be set"
     return "; ".join(c.text for c in drive_conditions(error_byte))
 
 
 class RobotHealth(Signal):
-    """How a robot's drives and sensors are. Drives are in the motors' order.
+    """Condition of a robot's drives and sensors. Drives are in the motors' order.
 
     What a robot does not measure is zero, as in a simulator voltages, temperatures and currents.
     """
 
-    state = Field(dtype="int64", values=DrivePhase, text="what the drives do; see DrivePhase")
+    state = Field(dtype="int64", values=DrivePhase, text="phase of the drives; see DrivePhase")
     voltage = Field("n_joints", unit="V", text="supply voltage at every drive")
     temperature = Field("n_joints", text="temperature of every winding [deg C]")
     current = Field("n_joints", unit="A", text="measured torque current of every drive")
@@ -121,7 +121,7 @@ class RobotHealth(Signal):
     )
     age = Field("n_joints", unit="s", text="time since every drive answered last")
     imu_age = Field(unit="s", text="time since the last packet of the sensor board")
-    stamp = Field(unit="s", text="time of the newest measurement; a negative one says nothing")
+    stamp = Field(unit="s", text="time of the newest measurement; a negative one means nothing")
     joints_valid = Field(dtype="bool", text="every drive has answered in the last exchange")
     imu_valid = Field(
         dtype="bool", text="the board streams, and its IMU is not frozen or saturated"
@@ -132,7 +132,7 @@ class RobotHealth(Signal):
 
 
 class JointCommand(Signal):
-    """What the drives execute: mode, feedforward torque, joint targets and gains.
+    """Command to the drives: mode, feedforward torque, joint targets and gains.
 
     Units as in ``JointState``: the gains of a joint that slides are in N/m and N s/m.
     """
@@ -146,13 +146,13 @@ class JointCommand(Signal):
 
 
 class ThrustCommand(Signal):
-    """What the thrusters of a robot are to give, in the order of its description."""
+    """Commanded thrust of a robot's thrusters, in the order of its description."""
 
     thrust = Field("n_thrusters", unit="N", text="thrust asked of each")
 
 
 class ThrusterState(Signal):
-    """What the thrusters of a robot give, in the order of its description."""
+    """Thrust of a robot's thrusters, in the order of its description."""
 
     thrust = Field("n_thrusters", unit="N", text="thrust of each")
 
@@ -165,7 +165,8 @@ class ExternalForce(Signal):
 
 
 class RobotTruth(Signal):
-    """What only a simulator knows. Peaks and minima are over the physics steps of the last tick."""
+    """True state of the robot, known to a simulator only. Peaks and minima are over the physics steps of the last
+    tick."""
 
     base_position = Field(3, unit="m", frame="world", text="base origin")
     base_orientation = Field(4, unit="", text="quaternion x, y, z, w from body to world")

@@ -7,55 +7,39 @@ world instead.
 
 from __future__ import annotations
 
-from enum import IntEnum
-
+from ...planner.online.plan_outcome import PlanOutcome
 from ...runtime.language.signals import Field, Signal
 
-PART_ROWS = 20
+SEGMENT_ROWS = 20
 """Rows of a plan that are handed over at a time."""
 PLAN_ROWS = 240
 """Rows of a plan at most."""
 STONES_SEEN = 2
-"""How many stones ahead may be seen."""
-
-
-class PlanOutcome(IntEnum):
-    """Which plan answers a request."""
-
-    NONE = 0
-    """None was asked for."""
-    PLANNED = 1
-    """A plan of what was asked."""
-    NEAREST = 2
-    """What was asked is out of reach; the plan is of the nearest that is within."""
-    UNSOLVED = 3
-    """No motion was found; the plan is the nearest of the stored ones."""
-    INVALID = 4
-    """The plan failed its check; the nearest of the stored ones is followed."""
+"""Largest number of stones seen ahead."""
 
 
 class JumpCommand(Signal):
-    """Where the next jump should land."""
+    """Command of the next jump's landing."""
 
     number = Field(
         dtype="int64", text="counts the commands; a jump follows a number that is greater"
     )
     replaces = Field(
         dtype="bool",
-        text="whether it takes the place of a command whose jump has not begun; else it waits for it",
+        text="it takes the place of a command whose jump has not begun; else it waits for it",
     )
     placed = Field(
         dtype="bool",
-        text="whether the rest is a foothold in the estimator's world: x, y, heading and height of the ground",
+        text="the rest is a foothold in the estimator's world: x, y, heading and height of the ground",
     )
-    ahead = Field(unit="m", text="how far ahead of the feet")
-    aside = Field(unit="m", text="how far to their left")
+    ahead = Field(unit="m", text="distance ahead of the feet")
+    aside = Field(unit="m", text="distance to their left")
     turn = Field(unit="rad", text="change of heading, to the left")
-    up = Field(unit="m", text="how much higher the ground is there")
+    up = Field(unit="m", text="height of the ground there above the present one")
 
 
 class BodyTwist(Signal):
-    """The velocity that is asked for, with the fields of ROS 2's ``Twist``."""
+    """The commanded velocity, with the fields of ROS 2's ``Twist``."""
 
     linear = Field(
         3, unit="m/s", frame="body", text="ahead and to the left; upwards: a jump on the spot"
@@ -64,7 +48,7 @@ class BodyTwist(Signal):
 
 
 class FootholdPose(Signal):
-    """Where the feet should stand, with the fields of ROS 2's ``PoseStamped``."""
+    """Commanded place of the feet, with the fields of ROS 2's ``PoseStamped``."""
 
     position = Field(3, unit="m", frame="world", text="of the middle of the feet, on the ground")
     orientation = Field(4, text="their heading, as a quaternion; all zeros: none yet")
@@ -73,9 +57,9 @@ class FootholdPose(Signal):
 class SeenStones(Signal):
     """The next footholds, in the order in which they follow."""
 
-    count = Field(dtype="int64", text="how many are seen; rows behind them keep their numbers")
+    count = Field(dtype="int64", text="number of stones seen; rows behind them keep their numbers")
     place = Field(
-        (STONES_SEEN, 3), unit="m", frame="world", text="where the middle of the feet should stand"
+        (STONES_SEEN, 3), unit="m", frame="world", text="places for the middle of the feet"
     )
 
 
@@ -84,30 +68,30 @@ class PlanRequest(Signal):
 
     number = Field(dtype="int64", text="counts the requests, from 1; zero: none yet")
     command = Field(dtype="int64", text="number of the command that it answers")
-    waits = Field(dtype="bool", text="whether its jump has not begun yet")
-    ahead = Field(unit="m", text="how far ahead of the feet")
-    aside = Field(unit="m", text="how far to their left")
+    waits = Field(dtype="bool", text="its jump has not begun yet")
+    ahead = Field(unit="m", text="distance ahead of the feet")
+    aside = Field(unit="m", text="distance to their left")
     turn = Field(unit="rad", text="change of heading, to the left")
-    up = Field(unit="m", text="how much higher the ground is there")
+    up = Field(unit="m", text="height of the ground there above the present one")
 
 
-class PlanPart(Signal):
+class PlanSegment(Signal):
     """A few rows of a plan, which is handed over part by part; see ``JumpTable``."""
 
     number = Field(dtype="int64", text="of the request; zero: no plan yet")
-    part = Field(dtype="int64", text="number of this part, from 0")
-    parts = Field(dtype="int64", text="how many parts the plan has")
-    time = Field(PART_ROWS, unit="s", text="of each row, since the plan begins")
-    rows = Field((PART_ROWS, "plan_width"), text="columns of the reference, side by side")
-    contact = Field((PART_ROWS, "n_contacts"), dtype="bool", text="which points carry load")
-    marks = Field(2, unit="s", text="when squat and recovery begin")
-    jump = Field(3, unit="s", text="when thrust, flight and landing begin")
-    toes_first = Field(dtype="bool", text="whether the flight ends on some of the points only")
-    outcome = Field(dtype="int64", values=PlanOutcome, text="which plan it is")
-    ahead = Field(unit="m", text="how far ahead of the feet it lands")
-    aside = Field(unit="m", text="how far to their left")
+    segment = Field(dtype="int64", text="number of this segment, from 0")
+    segments = Field(dtype="int64", text="number of segments of the plan")
+    time = Field(SEGMENT_ROWS, unit="s", text="of each row, since the plan begins")
+    rows = Field((SEGMENT_ROWS, "plan_width"), text="columns of the reference, side by side")
+    contact = Field((SEGMENT_ROWS, "n_contacts"), dtype="bool", text="points that carry load")
+    marks = Field(2, unit="s", text="times at which squat and recovery begin")
+    jump = Field(3, unit="s", text="times at which thrust, flight and landing begin")
+    toes_first = Field(dtype="bool", text="the flight ends on some of the points only")
+    outcome = Field(dtype="int64", values=PlanOutcome, text="kind of the plan")
+    ahead = Field(unit="m", text="distance of the landing ahead of the feet")
+    aside = Field(unit="m", text="distance to their left")
     turn = Field(unit="rad", text="its change of heading")
-    up = Field(unit="m", text="how much higher the ground is there")
+    up = Field(unit="m", text="height of the ground there above the present one")
 
 
 class PlanRows(Signal):
@@ -115,12 +99,12 @@ class PlanRows(Signal):
 
     time = Field(PLAN_ROWS, unit="s", text="of each row, since the plan begins")
     rows = Field((PLAN_ROWS, "plan_width"), text="columns of the reference, side by side")
-    contact = Field((PLAN_ROWS, "n_contacts"), dtype="bool", text="which points carry load")
-    marks = Field(2, unit="s", text="when squat and recovery begin")
-    jumps = Field((1, 3), unit="s", text="when thrust, flight and landing begin")
-    toes_first = Field(1, dtype="bool", text="whether the flight ends on some of the points only")
-    outcome = Field(dtype="int64", values=PlanOutcome, text="which plan it is")
-    done = Field(4, text="where it lands: ahead, aside [m], turn [rad] and up [m]")
+    contact = Field((PLAN_ROWS, "n_contacts"), dtype="bool", text="points that carry load")
+    marks = Field(2, unit="s", text="times at which squat and recovery begin")
+    jumps = Field((1, 3), unit="s", text="times at which thrust, flight and landing begin")
+    toes_first = Field(1, dtype="bool", text="the flight ends on some of the points only")
+    outcome = Field(dtype="int64", values=PlanOutcome, text="kind of the plan")
+    done = Field(4, text="place of the landing: ahead, aside [m], turn [rad] and up [m]")
 
 
 class JumpFrame(Signal):
@@ -131,7 +115,7 @@ class JumpFrame(Signal):
 
 
 class CourseGoal(Signal):
-    """Where the feet should be after the last command that was taken, by all commands so far."""
+    """Goal of the feet after the last command that was taken, by all commands so far."""
 
     number = Field(dtype="int64", text="jumps that were begun")
     position = Field(
@@ -139,4 +123,6 @@ class CourseGoal(Signal):
     )
     heading = Field(unit="rad", text="their heading since then, to the left")
     height = Field(unit="m", text="of the ground there, above that where the run began")
-    outcome = Field(dtype="int64", values=PlanOutcome, text="which plan the last jump follows")
+    outcome = Field(
+        dtype="int64", values=PlanOutcome, text="kind of the plan that the last jump follows"
+    )

@@ -1,1 +1,2 @@
-"""What the verbs need: printing, options, progress, running graphs, and how runs, plans and studies are made and shown."""
+"""Common parts of the verbs: printing, options, progress, running graphs, and runs, plans and
+studies."""

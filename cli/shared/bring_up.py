@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ...hal.bear.bring_up.steps import BringUpStep
 
 PATIENCE = 300.0
-"""How long a step waits for the person [s]."""
+"""Longest time that a step waits for the person [s]."""
 _PAUSE = 0.005
 
 
@@ -66,7 +66,7 @@ def bring_up(
 
 
 def _say(text: str) -> None:
-    """For the person; standard output belongs to ``--json``."""
+    """Print for the person, on standard error; standard output belongs to ``--json``."""
     typer.echo(text, err=True)
 
 

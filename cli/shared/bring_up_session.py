@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 TWIN = "twin"
 """The name of both ports of a robot that exists as a twin only."""
 HOLDING_TIME = 30.0
-"""How long somebody has to take the dead man's switch [s]."""
+"""Time that a person has to take the dead man's switch [s]."""
 
 
 def twin_session(file: Path, robot: RobotDescription, hand: RobotByHand) -> Session:
-    """A session with a twin: nobody is asked, and time goes on with the exchanges."""
+    """Open a session with a twin, without questions; time goes on with the exchanges."""
     from ...hal.bear.bring_up.session import Devices, Session
     from ...hal.bear.bus import BearBus
     from ...hal.bear.sense_board import SenseBoard
@@ -50,7 +50,7 @@ def twin_session(file: Path, robot: RobotDescription, hand: RobotByHand) -> Sess
 
 
 def port_session(file: Path, robot: RobotDescription, operator: Operator) -> Session:
-    """A session with what is at the serial ports of the file."""
+    """Open a session with the devices at the serial ports of the file."""
     from ...hal.bear.bring_up.session import Devices, Session
     from ...hal.bear.bus import BearBus, open_port
     from ...hal.bear.configuration import Hardware
@@ -100,13 +100,13 @@ def run_on_robot(
 
 
 def _recording(file: Path, graph: str) -> Path:
-    """Where the runs of a graph are recorded: beside the file of the hardware."""
+    """Return the path of the recordings of a graph: beside the file of the hardware."""
     return file.with_name(f"{file.stem}.{Path(graph).stem}.rrd")
 
 
 @contextmanager
 def held_pace(hardware: Hardware) -> Iterator[Callable[[], bool]]:
-    """Waits for the next cycle of the bus, and says whether the dead man's switch is held.
+    """Wait for the next cycle of the bus, and tell whether the dead man's switch is held.
 
     A twin in virtual time takes the next cycle at once, and nothing must be held.
     """

@@ -19,14 +19,14 @@ from importlib.metadata import PackageNotFoundError, distribution, packages_dist
 from pathlib import Path
 
 from ... import __version__
-from ...logs.file.surroundings import files_read, parameter_files
+from ...logs.file.dependencies import files_read, parameter_files
 from ...planner.library.library import shipped_folder, user_folder
-from ...runtime.carried import copy_module, is_own_module, with_robot_beside
+from ...runtime.bundle import copy_module, is_own_module, with_robot_beside
 from ...runtime.graph import load
 from ...runtime.language.errors import AloftError
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.links.part import part_graph
-from ...runtime.placement.placed import PlacedGraph, moves_actuators, place
+from ...runtime.placement.placed import PlacedGraph, moves_actuators, split_over_machines
 from ...runtime.running.memory import BoundGraph
 from ...runtime.transports.keys import secured
 
@@ -38,7 +38,7 @@ WHEELS, KEYS, CACHE = "wheels", "keys", "cache"
 
 @dataclass(frozen=True)
 class Deployment:
-    """What was written.
+    """The files of a deployment that were written.
 
     Attributes:
         folder: where.
@@ -75,7 +75,7 @@ def deploy(
     part = checked
     problems: list[str] = []
     if machine or checked.machines:
-        placed = place(checked)
+        placed = split_over_machines(checked)
         placed.machine(machine)
         part = part_graph(placed, machine)
         if any(spec.endpoint.startswith("tls/") for spec in checked.machines):
@@ -130,7 +130,8 @@ def _missing_keys(placed: PlacedGraph, machine: str, keys: Path | None) -> list[
 
 
 def _destinations(graph: CheckedGraph, bound: BoundGraph, problems: list[str]) -> dict[str, Path]:
-    """Where each file goes that does not ship with aloft. What a parameter names keeps its name."""
+    """Return the destination of each file that does not ship with aloft. What a parameter names
+    keeps its name."""
     named = {**parameter_files(graph), **files_read(bound)}
     found: dict[str, Path] = {}
     for entry, file in named.items():
@@ -179,7 +180,8 @@ def _wheels(folder: Path | None, problems: list[str]) -> dict[str, Path]:
 
 
 def _requirements(graph: CheckedGraph) -> list[str]:
-    """aloft, what it needs, the extras of which something is imported, and what blocks are installed in."""
+    """Return the requirements of the deployment: aloft, its own, the extras of which something is
+    imported, and the distributions that blocks are installed in."""
     imported = {name.partition(".")[0] for name in sys.modules}
     distributions = packages_distributions()
     loaded = {name for module in imported for name in distributions.get(module, ())}
@@ -205,7 +207,8 @@ def _requirements(graph: CheckedGraph) -> list[str]:
 
 
 def _needs(name: str) -> tuple[list[str], list[str]]:
-    """The names of what a distribution always needs, and of what its extras need."""
+    """Return the names of the distributions that one always needs, and of those that its extras
+    need."""
     always: list[str] = []
     extras: list[str] = []
     for text in distribution(name).requires or ():

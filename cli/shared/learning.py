@@ -28,7 +28,7 @@ NOISE_SEEDS = 1000
 
 @dataclass(frozen=True)
 class LearningOptions:
-    """Whether the robot learns from its jumps."""
+    """The options of learning from jumps."""
 
     learn: Annotated[
         Path | None,
@@ -47,7 +47,7 @@ class LearningOptions:
 
 
 @dataclass(frozen=True)
-class PlannedGraph:
+class ReadyJump:
     """A graph that is ready to jump, and what its robot is to do."""
 
     graph: Graph
@@ -66,7 +66,7 @@ class Attempt:
     lesson: Lesson | None
 
 
-Prepare = Callable[[Mapping[str, float], Sequence[str]], PlannedGraph]
+Prepare = Callable[[Mapping[str, float], Sequence[str]], ReadyJump]
 """Plans a task with these changes, and loads the graph with these further settings."""
 
 
@@ -128,8 +128,8 @@ def learn_jumps(
     return code
 
 
-def known(file: Path, ready: PlannedGraph) -> LearntJumps:
-    """What the robot has learnt so far."""
+def known(file: Path, ready: ReadyJump) -> LearntJumps:
+    """Read the corrections that the robot has learnt so far."""
     from ...planner.library.learnt import LearntJumps, read_learnt
 
     robot = ready.graph.checked.robot
@@ -148,7 +148,7 @@ def recorded_run(graph: Graph, record: Path, as_json: bool) -> RunResult:
 
 
 def taught(result: RunResult, plan: PlannedJump, learnt: LearntJumps) -> Attempt:
-    """What became of a jump that had the corrections in ``learnt``."""
+    """Judge a jump that had the corrections in ``learnt``."""
     from ...planner.library.learnt import launch_of
     from ...studies.jump_learning import lesson_of
 

@@ -24,7 +24,7 @@ TIMEOUT = 10.0
 
 @dataclass(frozen=True)
 class RemoteRunAddress:
-    """Where the parts of a graph are looked for: its file, overrides, the folder of keys and the
+    """The address of the parts of a graph: its file, overrides, the folder of keys and the
     observer's name for TLS, and the process of ``aloft run --local``, zero for the only one."""
 
     graph: Path
@@ -35,7 +35,7 @@ class RemoteRunAddress:
 
 
 def open_live_run(name: str, remote: RemoteRunAddress | None = None) -> WatchedRun:
-    """The running graph called ``name``, or the only one; all parts of a graph on several
+    """Open the running graph called ``name``, or the only one; all parts of a graph on several
     machines.
 
     Args:
@@ -60,12 +60,12 @@ def open_live_run(name: str, remote: RemoteRunAddress | None = None) -> WatchedR
 
 
 def _whole(run: LiveRun, path: Path, remote: RemoteRunAddress | None) -> WatchedRun:
-    """The whole of the graph of which ``run`` is the part that answers at ``path``."""
+    """Return the whole of the graph of which ``run`` is the part that answers at ``path``."""
     from ...runtime.live.spread_run import SpreadRun
-    from ...runtime.placement.placed import place
+    from ...runtime.placement.placed import split_over_machines
     from ...runtime.transports.registry import transport_type
 
-    placed = place(run.graph)
+    placed = split_over_machines(run.graph)
     keys = remote.keys if remote is not None else None
     if keys is None and transport_type(placed.machines).needs_keys(placed):
         typer.echo(
@@ -80,21 +80,21 @@ def _whole(run: LiveRun, path: Path, remote: RemoteRunAddress | None) -> Watched
             run.refresh()
         except AloftError:
             return None
-        return place(run.graph)
+        return split_over_machines(run.graph)
 
     observer = remote.observer if remote is not None else "viewer"
     return SpreadRun(placed, keys, again, path, observer)
 
 
 def _spread_elsewhere(remote: RemoteRunAddress) -> SpreadRun | None:
-    """A graph whose parts answer over the network; ``None`` where it is for one process.
+    """Find a graph whose parts answer over the network; ``None`` where it is for one process.
 
     Raises:
         AloftError: the graph is wrong, or none of its parts was heard.
     """
     from ...runtime.live.spread_run import SpreadRun
     from ...runtime.loading import load
-    from ...runtime.placement.placed import place
+    from ...runtime.placement.placed import split_over_machines
     from .running_graphs import settings_of
 
     def settings() -> tuple[str, ...]:
@@ -104,7 +104,7 @@ def _spread_elsewhere(remote: RemoteRunAddress) -> SpreadRun | None:
     graph = load(remote.graph, [*known, *remote.overrides])
     if not graph.machines:
         return None
-    placed = place(graph)
+    placed = split_over_machines(graph)
 
     def again() -> PlacedGraph | None:
         nonlocal known
@@ -112,7 +112,7 @@ def _spread_elsewhere(remote: RemoteRunAddress) -> SpreadRun | None:
             if settings() == known:
                 return None
             known = settings()
-            return place(load(remote.graph, [*known, *remote.overrides]))
+            return split_over_machines(load(remote.graph, [*known, *remote.overrides]))
         except AloftError:
             return None
 
@@ -126,7 +126,8 @@ def _spread_elsewhere(remote: RemoteRunAddress) -> SpreadRun | None:
 
 
 def _control(placed: PlacedGraph) -> Path | None:
-    """The socket of a part on this machine that takes changes of parameters by its usual name."""
+    """Return the socket of a part on this machine that takes changes of parameters by its usual
+    name."""
     from ...runtime.live.parameter_endpoint import answers
     from .running_graphs import path_of
 

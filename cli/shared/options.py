@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def opened_recording(recording: Path, folder: Path | None) -> OpenedRun:
-    """The recorded run of a verb's arguments. Raises ``AloftError`` if there is none."""
+    """Open the recorded run of a verb's arguments. Raises ``AloftError`` if there is none."""
     from ...logs.replay.opened_run import OpenedRun
 
     if not recording.is_file():
@@ -40,14 +40,15 @@ def opened_recording(recording: Path, folder: Path | None) -> OpenedRun:
 
 
 def block_names(incomplete: str) -> list[str]:
-    """The names of blocks that begin with a text."""
+    """List the names of blocks that begin with a text."""
     from ...runtime.language.registry import known_names
 
     return [name for name in known_names() if name.startswith(incomplete)]
 
 
 def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
-    """The parameters, as ``block.parameter=``, of the graph on the command line that begin with a text."""
+    """List the parameters, as ``block.parameter=``, of the graph on the command line that begin
+    with a text."""
     from ...runtime.language.parameters import declared_fields
     from ...runtime.loading import LoadError, load
 
@@ -85,7 +86,8 @@ Cluster = Annotated[str, typer.Option(help="Run on a Dask cluster: tcp://127.0.0
 
 
 def expand_option_groups(verb: Callable[..., None]) -> Callable[..., None]:
-    """The verb as typer reads it: each group of options replaced by its fields, in their place."""
+    """Return the verb as typer reads it: each group of options replaced by its fields, in their
+    place."""
     kinds = get_type_hints(verb, include_extras=True)
     groups: dict[str, Any] = {name: kind for name, kind in kinds.items() if is_dataclass(kind)}
     options: list[Parameter] = []

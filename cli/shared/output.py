@@ -28,7 +28,7 @@ WIDE = 200
 
 
 def console(*, to_stderr: bool = False, quiet: bool = False) -> Console:
-    """Rich's console on standard output, or on standard error where JSON goes to the former."""
+    """Return Rich's console on standard output, or on standard error where JSON goes to the former."""
     from rich.console import Console
 
     made = Console(stderr=to_stderr, quiet=quiet, highlight=False)
@@ -38,7 +38,7 @@ def console(*, to_stderr: bool = False, quiet: bool = False) -> Console:
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """A table without boxes. Columns whose name starts with ``>`` are aligned to the right."""
+    """Make a table without boxes. Columns whose name starts with ``>`` are aligned to the right."""
     from rich import box
     from rich.markup import escape
     from rich.table import Table
@@ -60,7 +60,7 @@ def say(out: Console, text: str) -> None:
 
 
 def number(value: Any) -> str:
-    """A metric for a table: floats with four significant digits."""
+    """Format a metric for a table: floats with four significant digits."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
@@ -69,7 +69,7 @@ def number(value: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """``value`` as JSON can hold it: numbers that are not finite become null."""
+    """Convert ``value`` to one that JSON can hold: numbers that are not finite become null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -157,7 +157,7 @@ class TickCounter:
 
 @contextmanager
 def progress_bar(out: Console, text: str, total: int | None) -> Iterator[tuple[Progress, TaskID]]:
-    """A progress bar that disappears at the end. It is not drawn if the output is no terminal."""
+    """Show a progress bar that disappears at the end. It is not drawn if the output is no terminal."""
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
@@ -173,7 +173,7 @@ def progress_bar(out: Console, text: str, total: int | None) -> Iterator[tuple[P
 
 
 MANY_KERNELS = 10
-"""Fewer are compiled in some seconds, of which nobody need be told."""
+"""Least number of kernels whose compilation is announced; fewer take some seconds only."""
 
 
 @contextmanager

@@ -80,7 +80,8 @@ def draw_paper(
 def traced(
     runs: Sequence[Run], seed: int, journal: Journal, workers: int, screen: Console
 ) -> dict[str, Trace]:
-    """The runs with that seed and their signals, by task. Their outcomes are added to the journal.
+    """Make the runs with that seed and return their signals, by task. Their outcomes are added to
+    the journal.
 
     Raises:
         AloftError: one of them broke.

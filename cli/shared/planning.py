@@ -1,4 +1,4 @@
-"""What ``aloft plan`` shows of a plan: tables, JSON and the motion for a recording; and grids of plans."""
+"""Output of ``aloft plan``: tables, JSON and the motion for a recording; and grids of plans."""
 
 from __future__ import annotations
 
@@ -69,8 +69,8 @@ def print_plan(
 
 
 def winding_heat(plan: PlannedJump, robot: RobotDescription) -> dict[str, float]:
-    """The copper heat of each motor's winding from the first knot to the last [J], by the resistance and the torque
-    constant that ``blocks.SafetyMonitor`` takes by default.
+    """Compute the copper heat of each motor's winding from the first knot to the last [J], by the
+    resistance and the torque constant that ``blocks.SafetyMonitor`` takes by default.
 
     A run also stands before and after: in simulation ``winding_heat_j`` of jumps of 12 cm is 10 J more.
     """
@@ -84,7 +84,7 @@ def winding_heat(plan: PlannedJump, robot: RobotDescription) -> dict[str, float]
 
 
 def _shown(value: Any) -> str:
-    """What the recipe chose, as text: a sequence of phases by their times."""
+    """Format a choice of the recipe: a sequence of phases by their times."""
     if isinstance(value, list):
         return ", ".join(
             f"{span['phase']}{' on ' + span['contacts'] if span['contacts'] != 'all' else ''}"
@@ -101,7 +101,7 @@ def _shown(value: Any) -> str:
 def plan_json(
     plan: PlannedJump, robot: RobotDescription, path: Path | None, kept: bool, reason: str
 ) -> dict[str, Any]:
-    """A plan as an entry of the JSON output."""
+    """Return a plan as an entry of the JSON output."""
     return {
         "task": plan.task.name,
         "success": plan.valid,
@@ -118,7 +118,7 @@ def plan_json(
 
 
 def failure(task: JumpTask, robot: RobotDescription, error: PlanError) -> dict[str, Any]:
-    """A task that could not be planned as an entry of the JSON output."""
+    """Return a task that could not be planned as an entry of the JSON output."""
     return {
         "task": task.name,
         "success": False,
@@ -131,7 +131,7 @@ def failure(task: JumpTask, robot: RobotDescription, error: PlanError) -> dict[s
 
 
 def nearest_json(found: NearestFeasible, path: Path) -> dict[str, Any]:
-    """The nearest task that has a plan as part of the JSON output."""
+    """Return the nearest task that has a plan as part of the JSON output."""
     return {
         "parameter": found.parameter,
         "asked": found.asked,
@@ -150,7 +150,7 @@ def nearest_json(found: NearestFeasible, path: Path) -> dict[str, Any]:
 
 
 def summary(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """One line for every task of the command line."""
+    """Make one line for every task of the command line."""
     cells = []
     for row in rows:
         figures = row.get("figures", {})
@@ -168,7 +168,7 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def listed_row(path: Path, header: Mapping[str, Any]) -> dict[str, Any]:
-    """A kept plan as an entry of the JSON output, from its file's header."""
+    """Return a kept plan as an entry of the JSON output, from its file's header."""
     report = header.get("report") or {}
     return {
         "task": header.get("task", {}).get("name", ""),
@@ -181,7 +181,7 @@ def listed_row(path: Path, header: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def listing(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """One line for every kept plan."""
+    """Make one line for every kept plan."""
     cells = []
     for row in rows:
         asked = [f"{100 * (row['asked'].get(name) or 0.0):.4g}" for name in
@@ -199,12 +199,12 @@ def listing(rows: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def failure_rows(rows: Sequence[GridRow]) -> list[tuple[str, str]]:
-    """A line for every task of a grid that has no plan."""
+    """Return a line for every task of a grid that has no plan."""
     return [(row.task.name, row.reason.partition("\n")[0]) for row in rows]
 
 
 def recorded_motion(plan: PlannedJump, robot: RobotDescription) -> MotionRecording:
-    """The plan as a motion with time series, with an instant about every 10 ms."""
+    """Return the plan as a motion with time series, with an instant about every 10 ms."""
     from ...logs.recording.motion_recording import MotionRecording
     from ...planner.checking.evidence import Evidence
     from ...planner.checking.plan_tests import allowed_motor_torque

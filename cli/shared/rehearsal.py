@@ -30,7 +30,7 @@ def rehearsal_of_file(
     file: Path, task: JumpTask, library: PlanLibrary, keep: Path | None, wanted: bool,
     screen: Console, landing: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
-    """As ``rehearsal``, of a task's file in the shipped graph of its robot."""
+    """Rehearse as ``rehearsal`` does, with a task's file in the shipped graph of its robot."""
     from ...files.nodes import text_of
 
     if task.robot not in jump_graphs() and not wanted:

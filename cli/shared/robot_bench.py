@@ -193,7 +193,7 @@ def schema() -> None:
 
 @contextmanager
 def _bus(file: Path) -> Iterator[tuple[BearBus, Hardware, RobotDescription]]:
-    """The open bus of a file of the hardware, with the robot that it names."""
+    """Open the bus of a file of the hardware, with the robot that it names."""
     from ...hal.bear.bus import BearBus, open_port
     from ...hal.bear.configuration import Hardware
     from ...robots.description import find_robot

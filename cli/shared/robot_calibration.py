@@ -1,4 +1,4 @@
-"""``aloft robot calibrate``: what sensors, motors and joints of a robot are like, from how it sways."""
+"""``aloft robot calibrate``: the properties of a robot's sensors, motors and joints, from its swaying."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def calibrate(
 
 
 def _chosen(source: Path | None, robot: str) -> tuple[Path, list[str]]:
-    """The graph or recording, and the settings that name its robot: one of both is given."""
+    """Return the graph or recording, and the settings that name its robot: one of both is given."""
     if (source is None) == (robot == ""):
         raise AloftError("give a graph or a recording, or a robot, such as --robot go2")
     if source is not None:
@@ -105,7 +105,7 @@ def _chosen(source: Path | None, robot: str) -> tuple[Path, list[str]]:
 
 @contextmanager
 def _blocks_of(source: Path) -> Iterator[None]:
-    """A block or a port that is not there is an error of this file."""
+    """Report a missing block or port as an error of this file."""
     try:
         yield
     except KeyError as error:
@@ -117,7 +117,8 @@ def _blocks_of(source: Path) -> Iterator[None]:
 def _measured(
     source: Path, settings: list[str], block: str, command: str, whole: bool = True
 ) -> SwayedRun:
-    """A run that is made now, or a recorded one; ``whole``: a run that does not succeed is of no use."""
+    """Return a run that is made now, or a recorded one; ``whole``: a run that does not succeed is
+    of no use."""
     from ...studies.robot_calibration import read_run, swayed
 
     if source.suffix in (".yaml", ".yml"):
@@ -135,8 +136,8 @@ def _measured(
 
 
 def _by_phase(run: SwayedRun, found: Calibration) -> dict[str, dict[str, float]]:
-    """What is not explained in the phases in which the robot moves as it is told."""
-    from ...blocks.signals.jumping import Phase
+    """Return the unexplained forces of each phase in which the robot follows its commands."""
+    from ...planner.task.phase import Phase
     from ...robots.phase_residuals import phase_residuals
 
     standing = (Phase.STAND, Phase.SQUAT, Phase.RECOVER)

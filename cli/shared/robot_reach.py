@@ -1,4 +1,4 @@
-"""``aloft robot reach``: how far a robot jumps in every direction, and what ends it."""
+"""``aloft robot reach``: a robot's reach in every direction, and the limits that end it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""What verbs share that let a robot do something in its trial: which robot, trial and seeds, and the recording."""
+"""Common parts of the verbs that run a robot in its trial: robot, trial and seeds, and the
+recording."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TrialOptions:
-    """Which graph runs, in which trial."""
+    """The options that choose the graph and its trial."""
 
     robot: Annotated[
         str, typer.Option(help="The robot: its name, or a URDF, MJCF or YAML file.")
@@ -41,7 +42,7 @@ class TrialOptions:
 
 @dataclass(frozen=True)
 class RecordOptions:
-    """Whether the run is recorded, and where."""
+    """The options of recording a run."""
 
     record: Annotated[
         Path | None,
@@ -49,19 +50,19 @@ class RecordOptions:
     ] = None
     no_record: NoRecord = False
 
-    def place(self, verb: str) -> Path | None:
-        """Where the recording goes; ``None`` without one."""
+    def path_for(self, verb: str) -> Path | None:
+        """Return the path of the recording; ``None`` without one."""
         return None if self.no_record else self.record or Path("recordings") / f"{verb}.rrd"
 
 
 def require_one_or_many(running: TrialOptions, recording: RecordOptions) -> None:
-    """Raise ``AloftError`` where many seeds are to be run, and something is asked for one run only."""
+    """Raise ``AloftError`` where many seeds are to be run with an option for one run only."""
     if running.seeds and (recording.record is not None or running.seed):
         raise AloftError("--seeds runs many seeds and records nothing: leave out --seed, --record")
 
 
 def trial_settings_of(running: TrialOptions) -> list[str]:
-    """The overrides of a graph for the trial that is asked for, before the user's own."""
+    """Return the overrides of a graph for the requested trial, before the user's own."""
     from ...files.nodes import text_of
     from ...studies.rehearsal import trial_settings
 
@@ -69,7 +70,8 @@ def trial_settings_of(running: TrialOptions) -> list[str]:
 
 
 def graph_of(robot: str) -> tuple[Path, list[str]]:
-    """The shipped graph in which a robot jumps, and the settings that name robot and task there.
+    """Return the shipped graph in which a robot jumps, and the settings that name robot and task
+    there.
 
     A robot without a graph of its own, also one in a URDF, MJCF or YAML file, jumps in that of all
     robots.
@@ -87,11 +89,11 @@ def graph_of(robot: str) -> tuple[Path, list[str]]:
 
 
 FIRST_RISE = 0.1
-"""How high a robot without a task of its own jumps, if it is not said [m]."""
+"""Default height of the jump of a robot without a task of its own [m]."""
 
 
 def jump_graphs() -> dict[str, Path]:
-    """The shipped graph in which each robot jumps, by the robot's name."""
+    """Return the shipped graph in which each robot jumps, by the robot's name."""
     from ...runtime.loading.reading.files import PREFIX, shipped_graphs
 
     return {
@@ -102,7 +104,7 @@ def jump_graphs() -> dict[str, Path]:
 
 
 def robot_setting(robot: str) -> str:
-    """The override that gives a graph a robot, by its name or its file.
+    """Return the override that gives a graph a robot, by its name or its file.
 
     Raises:
         AloftError: there is no such robot.
@@ -136,7 +138,7 @@ def about_robot(name: str, doing: str, out: Console) -> dict[str, Any]:
 
 
 def quantity(name: str, text: str, unit: str, example: str) -> float:
-    """A quantity of the command line in ``unit``; it must say its own."""
+    """Parse a quantity of the command line in ``unit``; it must say its own."""
     from ...runtime.language.units import parse_quantity
 
     try:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class RunnableGraph(Protocol):
-    """What ``run_once`` runs: a graph, or one machine's part of it."""
+    """The object that ``run_once`` runs: a graph, or one machine's part of it."""
 
     @property
     def checked(self) -> CheckedGraph:
@@ -54,12 +54,12 @@ class RunnableGraph(Protocol):
         """Run it once."""
 
     def about(self) -> Mapping[str, Any]:
-        """What the JSON object says beside the result of the run."""
+        """Return the entries of the JSON object beside the result of the run."""
 
 
 @dataclass(frozen=True)
 class OneRunOptions:
-    """How one run is recorded, printed and computed.
+    """The options of recording, printing and computing one run.
 
     Attributes:
         record: where the recording goes; none: nowhere.
@@ -258,8 +258,8 @@ def print_verdict(result: RunResult) -> None:
 
 
 def code_with_recording(code: ExitCode, problem: str) -> ExitCode:
-    """The exit code of a run whose own is ``code``, where ``problem`` says what of its recording is
-    missing: a run that failed by itself keeps its own."""
+    """Return the exit code of a run whose own is ``code``, where ``problem`` says what of its
+    recording is missing: a run that failed by itself keeps its own."""
     return ExitCode.NOT_RECORDED if problem and code is ExitCode.SUCCESS else code
 
 
@@ -276,13 +276,13 @@ class CrashReporter:
         self._as_json = as_json
 
     def open(self, bound: BoundGraph) -> None:
-        """Nothing to prepare."""
+        """Prepare nothing."""
 
     def record(self, tick: int) -> None:
-        """Nothing to record."""
+        """Record nothing."""
 
     def close(self) -> None:
-        """Nothing to close."""
+        """Close nothing."""
 
     def abandoned(self, result: RunResult) -> None:
         """Print the result."""

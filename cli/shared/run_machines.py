@@ -26,7 +26,7 @@ from ...runtime.links.part import BoundPart, run_part
 from ...runtime.links.path_ages import NAME
 from ...runtime.live.part_feed import PartFeed
 from ...runtime.loading import load
-from ...runtime.placement.placed import PlacedGraph, place
+from ...runtime.placement.placed import PlacedGraph, split_over_machines
 from ...runtime.running.memory import BoundGraph
 from ...runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
 from ...runtime.running.run_result import RunResult, merge_metrics
@@ -55,10 +55,9 @@ GRACE = 15.0
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What the command line asks for: settings, where the recording goes (by default where one of
-    the graph goes) and whether it is kept, the name for ``aloft params``, how to print,
-    whether nothing is compiled, the folder of keys, for links over TLS, and whether blocks of kernels
-    are fused."""
+    """The options of a run: settings, the recording's path (by default that of a graph's) and
+    whether it is kept, the name for ``aloft params``, the way of printing, whether nothing is
+    compiled, the folder of keys, for links over TLS, and whether blocks of kernels are fused."""
 
     settings: Sequence[str]
     record: Path | None
@@ -80,10 +79,10 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
         AloftError: a part said nothing when it ended.
     """
     from ...logs.recording.merged_run import merge_recordings, path_metrics, read_parts, run_hash_of
-    from ...logs.recording.place import cause_of, remedy
+    from ...logs.recording.output_file import cause_of, remedy
     from .viewing import how_to_view
 
-    placed = place(load(path, options.settings))
+    placed = split_over_machines(load(path, options.settings))
     graph = placed.graph
     with tempfile.TemporaryDirectory(prefix="aloft-parts-") as folder:
         files = {machine.name: Path(folder) / f"{machine.name}.rrd" for machine in placed.machines}
@@ -133,7 +132,7 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
 def _run_processes(
     path: Path, options: RunOptions, placed: PlacedGraph, files: Mapping[str, Path]
 ) -> dict[str, dict[str, Any]]:
-    """What each part says at its end, by machine.
+    """Run the processes and return the report of each part at its end, by machine.
 
     Raises:
         AloftError: a part has said nothing.
@@ -178,7 +177,7 @@ def _run_processes(
 
 
 def main(*arguments: str) -> None:
-    """What the process of a part does: run the command line with these arguments."""
+    """Run the command line with these arguments in the process of a part."""
     from .. import main as run_command_line
 
     sys.argv = ["aloft", *arguments]
@@ -227,7 +226,7 @@ def _whole_result(
     run_hash: str,
     ticks: int,
 ) -> RunResult:
-    """The result of the whole run, from what each part said of its own, and from measured ages."""
+    """Join the result of the whole run, from the reports of the parts, and from measured ages."""
     graph = placed.graph
     by_block = {
         path: found
@@ -271,7 +270,8 @@ def _whole_result(
 
 
 def _culprits_first(part_reports: Mapping[str, Mapping[str, Any]]) -> Any:
-    """The machines that failed: first those that failed by themselves, then those that were told."""
+    """Return the machines that failed: first those that failed by themselves, then those that were
+    told."""
     failed = [name for name, part in part_reports.items() if part.get("exit_code", 3) == 3]
     return iter(sorted(failed, key=lambda name: bool(part_reports[name].get("heard"))))
 
@@ -296,7 +296,7 @@ def _verdict(
 def _times(
     graph: CheckedGraph, part_reports: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, BlockTimes]:
-    """The times of every block on its own machine."""
+    """Return the times of every block on its own machine."""
     return {
         path: BlockTimes(**found)
         for path in graph.order
@@ -351,7 +351,7 @@ class MachineRun:
     """
 
     def __init__(self, graph: CheckedGraph, machine: str, keys: Path | None = None) -> None:
-        placed = place(graph)
+        placed = split_over_machines(graph)
         self.bound = BoundPart(placed, machine, network_transport(placed, machine, keys))
         self._result: RunResult | None = None
 
@@ -380,7 +380,8 @@ class MachineRun:
         return self._result
 
     def about(self) -> Mapping[str, Any]:
-        """The machine, the metrics of each of its blocks, what its links have carried, and the others' clocks."""
+        """Return the machine, the metrics of each of its blocks, the traffic of its links, and the
+        others' clocks."""
         error = self._result.error if self._result is not None else None
         metrics = {path: dict(block.metrics()) for path, block in self.bound.blocks.items()}
         metrics |= {sink.name: dict(sink.metrics()) for sink in self.bound.path_ages}

@@ -30,7 +30,7 @@ SOCKET_SUFFIX = ".sock"
 
 
 def folder() -> Path:
-    """The folder of the sockets, which only the user can read.
+    """Return the folder of the sockets, which only the user can read.
 
     Raises:
         AloftError: it cannot be made, or belongs to somebody else.
@@ -49,21 +49,22 @@ def folder() -> Path:
 
 
 def path_of(name: str) -> Path:
-    """The socket of the run called ``name``. Raises ``AloftError`` for a name that is none."""
+    """Return the socket of the run called ``name``. Raises ``AloftError`` for a name that is none."""
     if not re.fullmatch(r"[A-Za-z0-9_.-]{1,40}", name) or name.startswith("."):
         raise AloftError(f"{name!r} cannot name a run: use letters, digits, '.', '_' and '-'")
     return folder() / f"{name}{SOCKET_SUFFIX}"
 
 
 def open_endpoint(name: str, *, paused: bool = False) -> ParameterEndpoint:
-    """An endpoint for a run called ``name``, which begins ``paused`` or not. Raises ``AloftError``."""
+    """Open an endpoint for a run called ``name``, which begins ``paused`` or not. Raises
+    ``AloftError``."""
     from ...runtime.live.parameter_endpoint import ParameterEndpoint
 
     return ParameterEndpoint(path_of(name), paused=paused)
 
 
 def find(name: str) -> Path:
-    """The socket of the run called ``name``, or of the only one there is.
+    """Find the socket of the run called ``name``, or of the only one there is.
 
     Raises:
         AloftError: there is none, or several and no name.
@@ -99,7 +100,7 @@ class LocalRun:
 
 @contextmanager
 def registered(graph: Path, settings: Sequence[str]) -> Iterator[None]:
-    """While the context lasts, the run of ``graph`` with these settings can be found.
+    """Make the run of ``graph`` with these settings one that can be found while the context lasts.
 
     Raises:
         AloftError: the user's folder cannot be used.
@@ -120,7 +121,7 @@ def registered(graph: Path, settings: Sequence[str]) -> Iterator[None]:
 
 
 def local_runs(graph: Path) -> list[LocalRun]:
-    """The runs of this graph file that live, by the number of their process.
+    """Find the runs of this graph file that live, by the number of their process.
 
     Raises:
         AloftError: the user's folder cannot be used.
@@ -134,7 +135,7 @@ def local_runs(graph: Path) -> list[LocalRun]:
 
 
 def settings_of(graph: Path, process: int = 0) -> tuple[str, ...]:
-    """The settings of the run of this graph that lives here; empty where there is none.
+    """Return the settings of the run of this graph that lives here; empty where there is none.
 
     Args:
         graph: the file.
@@ -160,7 +161,8 @@ def settings_of(graph: Path, process: int = 0) -> tuple[str, ...]:
 
 
 def _read(path: Path) -> dict[str, Any] | None:
-    """What a run says of itself; ``None``, and the file is gone, where no process holds it."""
+    """Read a run's description of itself; ``None``, and the file is gone, where no process holds
+    it."""
     with suppress(OSError, ValueError), path.open(encoding="utf-8") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -188,7 +190,7 @@ As = Annotated[
 def observer_of(
     graph: Path, overrides: list[str], keys: Path | None, name: str, process: int = 0
 ) -> Observer:
-    """An observer of a graph's machines, not yet connected.
+    """Make an observer of a graph's machines, not yet connected.
 
     Where ``aloft run --local`` runs the graph here, its settings and endpoints count, and
     ``process`` says which run where there are several.
@@ -199,7 +201,7 @@ def observer_of(
     """
     from ...runtime.links.observer import Observer
     from ...runtime.loading import load
-    from ...runtime.placement.placed import place
+    from ...runtime.placement.placed import split_over_machines
 
-    placed = place(load(graph, [*settings_of(graph, process), *overrides]))
+    placed = split_over_machines(load(graph, [*settings_of(graph, process), *overrides]))
     return Observer(placed, keys, name)

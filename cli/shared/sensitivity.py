@@ -1,4 +1,4 @@
-"""Which parameters decide a metric, for ``aloft study --sensitivity``: the runs, the table and the chart."""
+"""Sensitivity for ``aloft study --sensitivity``: the runs, the table and the chart."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SensitivityOptions:
-    """How a study is asked which parameters matter."""
+    """The options of a study's sensitivity."""
 
     sensitivity: Annotated[
         str,

@@ -24,19 +24,19 @@ from ...runtime.language.parameters import Parameters, group_of
 TRIAL = "warm"
 """The trial whose sizes are shown: ``real``, and what it adds."""
 ROBOT = "robot."
-"""What the trials' keys for the simulated robot begin with."""
+"""Prefix of the trials' keys for the simulated robot."""
 
 
 class Setting(NamedTuple):
-    """What a trial sets, as it is written, and the comment behind it."""
+    """A setting of a trial, as it is written, and the comment behind it."""
 
     value: Any
     source: str
 
 
 def simulated_effects(trial: str = TRIAL) -> list[dict[str, Any]]:
-    """Every parameter of an effect: ``group``, ``parameter``, ``text``, ``unit``, ``default``, what the trial
-    sets (``trial``, ``None`` if nothing) and ``source``.
+    """Return every parameter of an effect: ``group``, ``parameter``, ``text``, ``unit``,
+    ``default``, the trial's value (``trial``, ``None`` if it sets nothing) and ``source``.
 
     Groups are those of the simulator's parameters that ``hal/simulated/effects.py`` declares. Of its other
     parameters those count as effects that the trial sets.
@@ -55,7 +55,8 @@ def simulated_effects(trial: str = TRIAL) -> list[dict[str, Any]]:
 
 
 def commented_settings(trial: str) -> dict[str, Setting]:
-    """What a shipped trial sets of the simulated robot, by the parameter's path below ``robot``."""
+    """Return a shipped trial's settings of the simulated robot, by the parameter's path below
+    ``robot``."""
     file = shipped_folder() / "trials" / f"{trial}.yaml"
     return {
         key.removeprefix(ROBOT): setting
@@ -84,7 +85,7 @@ def _read(file: Path) -> dict[str, Setting]:
 def _groups(
     owner: type[Parameters], place: str, off: bool
 ) -> Iterator[tuple[str, type[Parameters], bool]]:
-    """A model and the groups in it, with their paths, and whether they are left out by default."""
+    """Yield a model and the groups in it, with their paths, and whether they are left out by default."""
     yield place, owner, off
     for name, info in owner.model_fields.items():
         group = group_of(info)
@@ -112,7 +113,7 @@ def _row(
 
 
 def effect_rows(found: list[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
-    """The rows of a table: parameter, unit, default, what the trial draws, source."""
+    """Yield the rows of a table: parameter, unit, default, what the trial draws, source."""
     for row in found:
         path = f"{row['group']}.{row['parameter']}" if row["group"] else row["parameter"]
         default = "no default" if row["required"] else _text(row["default"])

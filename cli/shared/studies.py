@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def check_cells(found: Study, expanded: Sequence[Cell], screen: Console) -> list[Cell]:
-    """The cells, after each was checked as ``aloft check`` checks a graph."""
+    """Check the cells as ``aloft check`` checks a graph, and return them."""
     from ...studies.expansion import checked_cells
     from ...studies.journal import code_fingerprint
     from .output import progress_bar
@@ -49,7 +49,7 @@ class RunMaker:
         self._successes = 0
 
     def __call__(self, runs: Sequence[Run]) -> list[Run]:
-        """All runs with their outcomes."""
+        """Make all runs and return them with their outcomes."""
         from ...studies.execution import make_runs
 
         self.asked += runs
@@ -133,7 +133,7 @@ MOST_ROWS = 60
 def study_json(
     study: Study, rows: Sequence[StudyRow], seeds: Sequence[int], folder: Path
 ) -> dict[str, Any]:
-    """The results as one JSON object."""
+    """Return the results as one JSON object."""
     from ...studies.journal import code_fingerprint
     from ...studies.study import FIRST_REPORT_SEED
 
@@ -239,7 +239,7 @@ def print_comparisons(screen: Console, comparisons: Sequence[Comparison]) -> Non
 
 
 def tuned_json(study: Study, best: Mapping[str, Draw], path: Path, broken: int) -> dict[str, Any]:
-    """The result of tuning as one JSON object."""
+    """Return the result of tuning as one JSON object."""
     assert study.tuning is not None
     return {
         "success": True,

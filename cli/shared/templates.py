@@ -26,7 +26,7 @@ class {name}(Block):
         share: float = live_parameter(0.1, gt=0.0, le=1.0, text="of the way to the input per run")
 
     params: Params
-    u = Input({name}Signal, text="what is filtered")
+    u = Input({name}Signal, text="the signal to filter")
     y = Output({name}Signal, text="the filtered numbers")
     x = State({name}Signal, text="the output of the run before")
 

@@ -53,7 +53,7 @@ def draw(recording: Path, layout: Path | None, path: Path) -> Path:
 
 
 def diagram_of(run: RecordedRun) -> bytes:
-    """The block diagram of the graph that ran, as PNG; nothing where its code has gone since."""
+    """Draw the block diagram of the graph that ran, as PNG; nothing where its code has gone since."""
     from ...logs.replay.opened_run import OpenedRun
     from ...runtime.drawing.diagram import diagram
     from ...runtime.drawing.layout import draw as drawn
@@ -98,7 +98,7 @@ def open_page(page: str) -> None:
 
 
 def how_to_view(recording: Path) -> str:
-    """The shortest command that shows a recording."""
+    """Return the shortest command that shows a recording."""
     program = Path(sys.argv[0])
     here = Path.cwd()
     name = program.relative_to(here) if program.is_relative_to(here) else program
@@ -107,14 +107,14 @@ def how_to_view(recording: Path) -> str:
 
 
 def read(file: Path, *, damaged: bool = False) -> RecordedRun:
-    """The recording. Raises ``AloftError`` if it cannot be read."""
+    """Read the recording. Raises ``AloftError`` if it cannot be read."""
     from ...logs.file import reader
-    from ...logs.recording.place import part_of
+    from ...logs.recording.output_file import unfinished_name
 
     try:
         return reader.read(file, damaged=damaged)
     except FileNotFoundError:
-        part = part_of(file)
+        part = unfinished_name(file)
         also = f"; {part} is there: it is being written, or was cut off" if part.exists() else ""
         raise AloftError(f"{file} cannot be read: there is no such file{also}") from None
     except OSError as error:

@@ -23,7 +23,7 @@ JUMPS = {
 }  # fmt: skip
 """The jumps of the page: graphs beside this file, and what they are called."""
 SEEDS = range(1000, 1008)
-"""Of the robots; none was used for tuning."""
+"""Seeds of the robots; none was used for tuning."""
 PAGE = ("index.html", "page.css", "page.js", "world.js")
 LIBRARIES = (
     "@mujoco/mujoco/mujoco.js", "three/build/three.module.js", "three/build/three.core.js",

@@ -19,16 +19,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aloft.blocks.signals.jumping import Phase
 from aloft.clib.cut import Cut
 from aloft.clib.module import Module
-from aloft.clib.part import NeedsPython, Part, needs_python
+from aloft.clib.part import NeedsPython, SubGraph, needs_python
 from aloft.clib.targets import TARGETS, compile_module, link
 from aloft.hal.simulated.mujoco_model import body_name, mujoco_spec
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.hal.simulated.plant import Plant
+from aloft.mathematics.compiling.foreign_call import ForeignCall
 from aloft.mathematics.compiling.kernel_call import KernelCall
-from aloft.mathematics.compiling.library_call import LibraryCall
+from aloft.planner.task.phase import Phase
 from aloft.robots.surfaces import robot_surfaces
 from aloft.runtime.loading.load import load
 from aloft.runtime.running.memory import BoundGraph
@@ -37,9 +37,10 @@ TO_MUJOCO, FROM_MUJOCO = (
     ("ctrl", "xfrc_applied"),
     ("qpos", "qvel", "sensordata", "site_xpos", "xipos"),
 )
-"""What is copied to the simulator before a step, and from it after each part of one."""
+"""Arrays copied to the simulator before a step, and from it after each part of one."""
 MODEL = ("body_mass", "body_inertia", "body_ipos", "geom_friction", "geom_solref", "geom_solimp")
-"""What the seeds of a trial change of the simulator's model, which MJCF has with six digits only."""
+"""Arrays of the simulator's model that a trial's seed changes; MJCF holds them with six digits
+only."""
 ARRAYS = {
     "phase": "step.phase.phase", "push": "push.push.force", "blow": "push.constants.force",
     "points": "robot.truth.contact_position", "forces": "robot.truth.contact_force",
@@ -49,7 +50,8 @@ ARRAYS = {
     "forbidden": "score.record.forbidden", "tilt": "score.record.peak_tilt",
     "bus": "", "state": "",
 }  # fmt: skip
-"""What a page shows or changes, by block, port or state, and field; and the whole memory of the graph."""
+"""Arrays that a page shows or changes, by block, port or state, and field; and the whole memory of
+the graph."""
 
 
 class World(NamedTuple):
@@ -69,7 +71,7 @@ class World(NamedTuple):
         return robot.plant
 
     def image(self) -> bytearray:
-        """The bytes of an instance."""
+        """Return the bytes of an instance."""
         return self.module.image.bytes_of(constant=False)
 
 
@@ -102,7 +104,7 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
     for key, calls in robot.calls.items():
         programs[key] = []
         for kind, group in groupby(calls, type):
-            if kind is LibraryCall:
+            if kind is ForeignCall:
                 programs[key] += group
                 continue
             made = list(group)
@@ -115,15 +117,15 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
         id(call): _drawn(call)
         for program in programs.values()
         for call in program
-        if isinstance(call, LibraryCall) and call not in (plant.step1, plant.step2)
+        if isinstance(call, ForeignCall) and call not in (plant.step1, plant.step2)
     }
     memory = bound.memory
     whole = {"bus": memory.bus.buffer, "state": memory.state.buffer}
     arrays = {key: whole[key] if key in whole else _array(bound, at) for key, at in ARRAYS.items()}
-    part = Part(Cut("", (), (), graph, ()), graph, bound, blocks, (), ())
+    part = SubGraph(Cut("", (), (), graph, ()), graph, bound, blocks, (), ())
     module = Module(name, part, 1, {}, functions, [*visible, *arrays.values(), *draws.values()])
 
-    def told(each: str | LibraryCall) -> Any:
+    def told(each: str | ForeignCall) -> Any:
         if isinstance(each, str):
             return each
         if id(each) not in draws:
@@ -139,7 +141,7 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
 
 
 def _array(bound: BoundGraph, place: str) -> NDArray[Any]:
-    """The memory of a field, by block, port or state, and field."""
+    """Return the memory of a field, by block, port or state, and field."""
     block, *names = place.split(".")
     found: Any = bound.blocks[block]
     for name in names:
@@ -147,8 +149,8 @@ def _array(bound: BoundGraph, place: str) -> NDArray[Any]:
     return np.asarray(found)
 
 
-def _drawn(call: LibraryCall) -> NDArray[np.float64]:
-    """The memory into which a call draws random numbers."""
+def _drawn(call: ForeignCall) -> NDArray[np.float64]:
+    """Return the memory into which a call draws random numbers."""
     size, address = int(call.words[2]), int(call.words[3])
     return np.ctypeslib.as_array((ctypes.c_double * size).from_address(address))
 
@@ -193,7 +195,8 @@ def write_world(
 
 
 def _looks(world: World) -> list[dict[str, Any]]:
-    """The surfaces of the robot's links: the body, corners [m, its frame], triangles, colour 0xRRGGBB."""
+    """Return the surfaces of the robot's links: the body, corners [m, its frame], triangles, colour
+    0xRRGGBB."""
     return [
         {"body": body_name(link), "corners": part.corners.round(4).ravel().tolist(),
          "triangles": part.triangles.ravel().tolist(), "color": part.color}
@@ -203,14 +206,14 @@ def _looks(world: World) -> list[dict[str, Any]]:
 
 
 def _places(world: World, fields: Sequence[str]) -> dict[str, list[int]]:
-    """Where arrays of the simulator are in an instance, and how many numbers they have."""
+    """Return the place of each array of the simulator in an instance, and its size."""
     arrays = {field: getattr(world.plant.data, field) for field in fields}
     place = world.module.image.place
     return {field: [place(array)[1], array.size] for field, array in arrays.items()}
 
 
 def _xml(world: World) -> str:
-    """The simulator's model as MJCF."""
+    """Return the simulator's model as MJCF."""
     plant = world.plant
     spec = mujoco_spec(
         plant._robot, scene=plant._params.build_scene(plant._robot), timestep=plant._params.timestep,

@@ -31,7 +31,7 @@ class Leg(Block):
         self._numbers = np.array([p.length, p.stiffness, p.damping]).T
 
     def step(self) -> None:
-        """One tick."""
+        """Make one tick."""
         command, leg = self.command, self._leg
         for field in (command.position, command.velocity, command.stiffness, command.damping):
             field.fill(0.0)

@@ -15,7 +15,7 @@ environment = aloft.gym.make(
 
 
 def total(gains: np.ndarray) -> float:
-    """The sum of rewards of an episode with the action -gains @ observation."""
+    """Return the sum of rewards of an episode with the action -gains @ observation."""
     observation, _ = environment.reset(seed=0)
     reward, ended = 0.0, False
     while not ended:

@@ -1,1 +1,1 @@
-"""Makes a Functional Mock-up Unit (FMI 3.0, co-simulation) of a graph or of a sub-graph."""
+"""Export of a graph or a sub-graph as a Functional Mock-up Unit (FMI 3.0, co-simulation)."""

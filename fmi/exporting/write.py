@@ -16,8 +16,8 @@ from ... import __version__
 from ...clib.cut import Cut, Terminal, cut, start_of
 from ...clib.part import NeedsPython
 from ...clib.write import prepare
-from ...logs.file.surroundings import named_file
-from ...runtime.carried import copy_module, with_robot_beside
+from ...logs.file.dependencies import named_file
+from ...runtime.bundle import copy_module, with_robot_beside
 from ...runtime.language.errors import AloftError
 from .native import compiler, write_native
 from .slave import GRAPH, INTERFACE

@@ -19,7 +19,7 @@ from .motor_loop import CommandQueue, MotorThread
 from .watchdog import AlwaysHeld, DeadMansSwitch, DriveWatchdog, open_switch, wait_until_held
 
 _HOLDING_TIME = 30.0
-"""How long somebody has to take the dead man's switch [s]."""
+"""Longest wait for somebody to take the dead man's switch [s]."""
 _LOST_TIME = 1.0
 """After so long without a cycle the motor thread counts as dead [s]."""
 
@@ -39,7 +39,7 @@ class BearParameters(DriveParameters):
     )
     sit_down_speed: float = parameter(
         0.15, unit="m/s", ge=0.0, le=0.5,
-        text="how fast a robot that stands at the end sits down before it is damped; zero: not",
+        text="speed at which a robot that stands at the end sits down before it is damped; zero: not",
     )  # fmt: skip
     latency: float = parameter(
         0.0, unit="s", ge=0, le=0.1, text="with virtual time: delay from sensing to the exchange"
@@ -106,7 +106,7 @@ class BearRobot(DrivenRobot):
 
     @classmethod
     def example_parameters(cls) -> dict[str, str]:
-        """A file of the hardware of BRUCE."""
+        """Return the file of BRUCE's hardware."""
         return {"hardware": str(Path(__file__).parents[2] / "graphs/hardware/bruce.yaml")}
 
     def setup(self) -> None:
@@ -167,7 +167,7 @@ class BearRobot(DrivenRobot):
         return min(self.params.command_age, limit) if limit else self.params.command_age
 
     def now(self) -> float:
-        """The time since ``open`` [s]: of the clock, or of the exchanges."""
+        """Return the time since ``open`` [s]: of the clock, or of the exchanges."""
         if self.params.time == "virtual":
             return self._driver.loop.cycles * self._hardware.bus.period
         return time.monotonic() - self._opened_at
@@ -184,7 +184,7 @@ class BearRobot(DrivenRobot):
         self.stop_after_fault()
 
     def advance(self) -> None:
-        """In virtual time, exchange until the next tick; else time passes by itself."""
+        """Exchange until the next tick in virtual time; else time passes by itself."""
         if self._queue is not None:
             self._queue.advance()
 
@@ -226,7 +226,7 @@ class BearRobot(DrivenRobot):
             self.driver.close()
 
     def _stop_reason(self) -> str:
-        """Why the motor thread must not go on; empty if it may."""
+        """Return the reason why the motor thread must not go on; empty if it may."""
         if self._watchdog is not None and self._watchdog.asked:
             return "`aloft robot estop` has damped the drives"
         if self._watchdog is not None and self._watchdog.tripped:

@@ -1,4 +1,4 @@
-"""What is done with drives on a bench, one safe step at a time; each function says what it sends."""
+"""Work with drives on a bench, one safe step at a time; each function documents what it sends."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ STATUS = (
     "torque_enable", "present_position", "present_velocity", "present_iq", "input_voltage",
     "winding_temperature", "mode", "limit_i_max", "watchdog_timeout",
 )  # fmt: skip
-"""What ``status`` reads of every drive."""
+"""Registers that ``status`` reads of every drive."""
 STILL = 0.005
 """A drive that moves further while it is calibrated is not still [rad]."""
 MAX_JOG = 0.5
-"""How far ``jog`` moves a motor at most [rad]."""
+"""Largest motion of ``jog`` [rad]."""
 FASTEST_ON_BENCH = 8.0
 """A motor that turns faster in a test of single motors is damped [rad/s]."""
 _READINGS = 100
@@ -82,7 +82,7 @@ def status(bus: BearBus, hardware: Hardware) -> list[dict[str, Any]]:
 def calibrate(
     bus: BearBus, hardware: Hardware, robot: RobotDescription, pose: Array
 ) -> dict[str, float]:
-    """The offset of every motor [rad] if the joints are in ``pose`` now [rad], (n_joints,).
+    """Return the offset of every motor [rad] if the joints are in ``pose`` now [rad], (n_joints,).
 
     Positions are read and nothing is written.
 
@@ -141,7 +141,7 @@ def jog(
         name: the motor.
         angle: at most ``MAX_JOG``, within the motor's ``low`` and ``high``.
         seconds: there and back.
-        next_cycle: waits for the next cycle, and says whether to go on.
+        next_cycle: waits for the next cycle, and returns whether to go on.
 
     Yields:
         The motor's goal and its angle [rad], after every exchange.

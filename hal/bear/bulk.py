@@ -156,7 +156,7 @@ class BulkExchange:
         return answered
 
     def _find(self, answer: memoryview, received: int, place: int, device: int) -> int:
-        """Where the whole answer of a device begins, from ``place`` on; -1 where there is none."""
+        """Find the start of a device's whole answer, from ``place`` on; -1 where there is none."""
         size = self._reply_size
         for start in range(place, received - size + 1):
             if (
@@ -172,7 +172,7 @@ class BulkExchange:
         return -1
 
     def _is_plausible(self, row: int) -> bool:
-        """Whether the answer can be one of this actuator."""
+        """Check whether the answer can be one of this actuator."""
         numbers, whole, last = self._numbers, self._whole_numbers, self.values[row]
         waited = self.ages.item(row)  # this exchange is counted already
         for column in range(len(self.read)):

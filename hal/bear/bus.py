@@ -1,4 +1,4 @@
-"""The bus of BEAR actuators: one master, and actuators that answer when they are asked."""
+"""The bus of BEAR actuators: one master, and actuators that only answer."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BAUDRATE = 8_000_000
 REPLY_TIME = 3e-3
 """Seconds that an actuator has for its reply: transfer, the adapter's delay of 1 ms, a reserve."""
 TRIES = 3
-"""How often a question is asked before the actuator counts as silent."""
+"""Number of questions before an actuator counts as silent."""
 
 
 class BusError(AloftError):
@@ -43,7 +43,7 @@ class SerialPort(Protocol):
 
     @property
     def in_waiting(self) -> int:
-        """How many bytes were received and not read."""
+        """The number of bytes received and not read."""
 
     def write(self, data: bytes | bytearray, /) -> int | None:
         """Send all bytes."""
@@ -60,7 +60,7 @@ class SerialPort(Protocol):
 
 @dataclass(frozen=True)
 class Reply:
-    """What an actuator answered: its error byte and its data."""
+    """Answer of an actuator: its error byte and its data."""
 
     device: int
     error_byte: int
@@ -68,12 +68,12 @@ class Reply:
 
     @property
     def problem(self) -> str:
-        """What the error byte reports, in words."""
+        """The faults that the error byte reports, in words."""
         return describe_conditions(self.error_byte)
 
     @property
     def failed(self) -> bool:
-        """Whether the actuator has switched its torque off."""
+        """True if the actuator has switched its torque off."""
         return is_critical(self.error_byte)
 
 
@@ -92,7 +92,7 @@ class BusCounts:
 
 
 def open_port(path: str, baudrate: int = BAUDRATE) -> SerialPort:
-    """The serial port at ``path``, for this process alone.
+    """Return the serial port at ``path``, for this process alone.
 
     Raises:
         BusError: there is no such port, or another process has it.
@@ -119,7 +119,7 @@ class BearBus:
     Args:
         port: the serial port.
         reply_time: seconds that an actuator has for its reply.
-        tries: how often a question is asked.
+        tries: number of times that a question is asked.
     """
 
     def __init__(
@@ -163,7 +163,7 @@ class BearBus:
         return self._ask(device, Instruction.PING, b"", 4)
 
     def scan(self, devices: Sequence[int]) -> dict[int, Reply]:
-        """The actuators of those addresses that answer, asked once each."""
+        """Ask the actuators of those addresses once each, and return those that answer."""
         found = {}
         for device in devices:
             reply = self._try(frame_bytes(device, Instruction.PING), device, 4)
@@ -172,7 +172,7 @@ class BearBus:
         return found
 
     def read(self, device: int, *names: str) -> dict[str, float]:
-        """The values of status or configuration registers, by name.
+        """Return the values of status or configuration registers, by name.
 
         Raises:
             BusError: there is no such register.
@@ -234,7 +234,7 @@ class BearBus:
         self.port.write(frame_bytes(device, Instruction.SAVE_CONFIG))
 
     def _ask(self, device: int, code: Instruction, data: bytes, length: int) -> Reply:
-        """The answer to a question, asked up to ``tries`` times."""
+        """Ask up to ``tries`` times, and return the answer."""
         question = frame_bytes(device, code, data)
         for _ in range(self.tries):
             reply = self._try(question, device, length)
@@ -246,7 +246,7 @@ class BearBus:
         )
 
     def _try(self, question: bytes, device: int, length: int) -> Reply | None:
-        """The answer with ``length`` bytes of data, or none in time.
+        """Return the answer with ``length`` bytes of data, or none in time.
 
         Raises:
             BusError: the question itself comes back.
@@ -283,14 +283,14 @@ class BearBus:
 
 
 def is_answer(code: int) -> bool:
-    """Whether the fifth byte of a frame is the error byte of an answer and no instruction: the
-    highest bit of an error byte is always set, that of an instruction never."""
+    """Check whether the fifth byte of a frame is the error byte of an answer and no instruction: the highest bit of an
+    error byte is always set, that of an instruction never."""
     return bool(code & HEALTHY)
 
 
 def _is_instruction(frame: BusFrame) -> bool:
-    """Whether a frame is an instruction, and a sensible one: pieces of damaged answers may have a
-    right checksum by chance."""
+    """Check whether a frame is an instruction, and a sensible one: pieces of damaged answers may have a right checksum
+    by chance."""
     size = len(frame.data)
     match frame.code:
         case Instruction.PING | Instruction.SAVE_CONFIG:
@@ -305,7 +305,7 @@ def _is_instruction(frame: BusFrame) -> bool:
 
 
 def register_of(name: str) -> Register:
-    """The register called ``name``.
+    """Return the register called ``name``.
 
     Raises:
         BusError: there is none; the message names the nearest.

@@ -1,4 +1,4 @@
-"""The file that says how a robot's drives and sensor board are connected, and what they may do.
+"""The hardware's file: the connections of a robot's drives and sensor board, and their limits.
 
 It belongs to one robot on one bench: its ports, addresses, directions and offsets. See
 ``docs/bring_up.md`` for how its values are found, and ``graphs/hardware/bruce.yaml`` for one.
@@ -14,7 +14,7 @@ import numpy as np
 import yaml
 
 from ...files.problems import Code, LoadError, Problems, listing, nearest
-from ...files.validation import place_of, read_model
+from ...files.validation import location_of, read_model
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import exponential, from_matrix, logarithm, to_matrix
 from ...robots.robot_description import RobotDescription
@@ -47,7 +47,7 @@ class BusSettings(Parameters):
         text="from a measurement to the middle of the time in which the goals made from it act",
     )
     reply_time: float = parameter(
-        0.003, unit="s", gt=0, le=5.0, text="what all drives have together for their answers"
+        0.003, unit="s", gt=0, le=5.0, text="time that all drives have together for their answers"
     )
     lost_cycles: int = parameter(
         5, ge=1, le=100, text="exchanges in a row that a drive may miss before all are damped"
@@ -59,12 +59,12 @@ class BusSettings(Parameters):
 
     @property
     def is_virtual(self) -> bool:
-        """Whether the port is that of a twin in virtual time: the file says so, and it is a pseudo-terminal."""
+        """True if the port is that of a twin in virtual time: by the file, and as it is a pseudo-terminal."""
         return self.time == "virtual" and os.path.realpath(self.port).startswith("/dev/pts/")
 
 
 def imu_rotation_of(to_base: Array) -> tuple[float, ...]:
-    """The ``imu_rotation`` of a board by the rotation from its IMU's axes to the base's, (3, 3)."""
+    """Return the ``imu_rotation`` of a board by the rotation from its IMU's axes to the base's, (3, 3)."""
     quaternion, turn = np.zeros(4), np.zeros(3)
     from_matrix(np.ascontiguousarray(to_base), quaternion)
     logarithm(quaternion, turn)
@@ -87,7 +87,7 @@ class BoardSettings(Parameters):
     )  # fmt: skip
     imu_position: ThreeNumbers = parameter(
         (0.0, 0.0, 0.0), unit="m",
-        text="where the IMU is, from the base's origin, base frame: `robot.imu_position` in a graph",
+        text="place of the IMU, from the base's origin, base frame: `robot.imu_position` in a graph",
     )  # fmt: skip
     sensors: list[str] = parameter(
         [],
@@ -126,13 +126,13 @@ class BoardSettings(Parameters):
         return matrix
 
     def mounted(self, robot: RobotDescription) -> tuple[MountedSensor, ...]:
-        """The mounted sensors in a packet, in their order."""
+        """Return the mounted sensors in a packet, in their order."""
         known = {sensor.name: sensor for sensor in mounted_sensors(robot)}
         return tuple(known[name] for name in self.sensors)
 
 
 class DriveSettings(Parameters):
-    """What all drives have in common."""
+    """Settings that all drives have in common."""
 
     torque_constant: float = parameter(
         0.35, unit="N m/A", gt=0,
@@ -189,10 +189,13 @@ class DriveSettings(Parameters):
     )
     jump_heating: float = parameter(
         5.0, ge=0, le=100.0,
-        text="what a jump heats a winding [K] where its plan is not known: too hot for one more, nothing is enabled",
+        text="heating of a winding by a jump [K] where its plan is not known: too hot for one more, nothing is enabled",
     )  # fmt: skip
     heat_margin: float = parameter(
-        1.5, ge=1.0, le=10.0, text="by how much more a run heats a winding than its plan alone does"
+        1.5,
+        ge=1.0,
+        le=10.0,
+        text="factor by which a run heats a winding more than its plan alone does",
     )
 
 
@@ -223,7 +226,7 @@ class MotorSettings(Parameters):
 
 
 class SoftStart(Parameters):
-    """How the drives come from where they are to the standing pose."""
+    """The way of the drives from where they are to the standing pose."""
 
     duration: float = parameter(
         2.0, unit="s", ge=0.1, le=60.0, text="for the way from the present to the standing pose"
@@ -260,10 +263,14 @@ class Hardware(Parameters):
     robot: str = parameter(..., text="the robot's name in its description")
     bus: BusSettings = parameter(..., text="the bus of the drives")
     board: BoardSettings = parameter(..., text="the sensor board")
-    drives: DriveSettings = parameter(DriveSettings(), text="what all drives have in common")
+    drives: DriveSettings = parameter(
+        DriveSettings(), text="settings that all drives have in common"
+    )
     motors: dict[str, MotorSettings] = parameter(..., text="every motor, by its name")
-    soft_start: SoftStart = parameter(SoftStart(), text="how the drives come to the standing pose")
-    dead_man: DeadMan = parameter(DeadMan(), text="what must be held while the drives are on")
+    soft_start: SoftStart = parameter(SoftStart(), text="way of the drives to the standing pose")
+    dead_man: DeadMan = parameter(
+        DeadMan(), text="switch that must be held while the drives are on"
+    )
 
     @classmethod
     def read(cls, file: Path, robot: RobotDescription | None = None) -> Hardware:
@@ -277,7 +284,7 @@ class Hardware(Parameters):
         if found is not None and tree is not None:
             for requirement in found.find_faults(robot):
                 problems.add(
-                    Code.UNMET_REQUIREMENT, requirement.message, place_of(tree, requirement.parameter.split(".")),
+                    Code.UNMET_REQUIREMENT, requirement.message, location_of(tree, requirement.parameter.split(".")),
                     at=requirement.parameter, expected=requirement.expected, found=requirement.found,
                     nearest=requirement.nearest, fix=requirement.fix,
                 )  # fmt: skip
@@ -286,7 +293,7 @@ class Hardware(Parameters):
         return found
 
     def find_faults(self, robot: RobotDescription | None) -> list[UnmetRequirement]:
-        """What contradicts itself, or the robot's description."""
+        """Report contradictions in the file, and to the robot's description."""
         found: list[UnmetRequirement] = []
         owners: dict[int, str] = {}
         for name, motor in self.motors.items():
@@ -324,15 +331,15 @@ class Hardware(Parameters):
         return found
 
     def torque_constants(self, robot: RobotDescription) -> Array:
-        """The torque at the output of every motor for a current [N m/A], (n_motors,)."""
+        """Return the torque at the output of every motor for a current [N m/A], (n_motors,)."""
         return np.array([self.torque_constant_of(name) for name in robot.transmission.motors])
 
     def torque_constant_of(self, motor: str) -> float:
-        """The torque constant of one motor [N m/A]: its own, or the common one."""
+        """Return the torque constant of one motor [N m/A]: its own, or the common one."""
         return self.motors[motor].torque_constant or self.drives.torque_constant
 
     def at_ports(self, bus: str, board: str, *, virtual: bool) -> str:
-        """The text of a file that is as this one, of a twin behind these ports."""
+        """Return the text of this file, for a twin behind these ports."""
         data = self.model_dump(mode="json")
         data["bus"] |= {"port": bus}
         data["board"] |= {"port": board}
@@ -342,7 +349,7 @@ class Hardware(Parameters):
         return yaml.safe_dump(data, sort_keys=False)
 
     def missing_calibration(self) -> list[str]:
-        """What a motor lacks before the drives may be switched on, with the step that finds it."""
+        """List what motors lack before the drives may be switched on, with the step that finds it."""
         motors = self.motors.items()
         parts = (
             ("an `offset`", "step 3", [name for name, motor in motors if motor.offset is None]),
@@ -401,8 +408,8 @@ class Hardware(Parameters):
 
     @classmethod
     def for_twin(cls, robot: RobotDescription) -> Hardware:
-        """The hardware of a robot that exists as a twin only: addresses from 1 in the order of the
-        motors, no offsets, nothing to hold."""
+        """Return the hardware of a robot that exists as a twin only: addresses from 1 in the order of the motors, no
+        offsets, nothing to hold."""
         return cls.model_validate(
             {
                 "robot": robot.name,

@@ -1,4 +1,4 @@
-"""What a robot on BEAR drives and its twin have in common: ports, parameters, and the cycle."""
+"""The common base of a robot on BEAR drives and its twin: ports, parameters, and the cycle."""
 
 from __future__ import annotations
 
@@ -20,9 +20,7 @@ from .driver import Driver
 class DriveParameters(DriveGains):
     """The drives' gains, and whether they may be switched on."""
 
-    armed: bool = parameter(
-        False, text="whether the drives may be switched on; else they are only watched"
-    )
+    armed: bool = parameter(False, text="the drives may be switched on; else they are only watched")
     planned_load: dict[str, float] | None = parameter(
         None,
         text="integral of the squared torque of every motor over the plan [N^2 m^2 s], {from: plan.load}: with "
@@ -52,7 +50,7 @@ class DrivenRobot(Robot):
 
     @classmethod
     def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
-        """As of any robot; the IMU is where the file of the hardware says."""
+        """Export as any robot does, with the IMU's place from the file of the hardware."""
         values = super().exported_values(params, context)
         name, robot = getattr(params, "hardware", ""), context.robot
         if not name or robot is None:
@@ -82,7 +80,7 @@ class DrivenRobot(Robot):
 
     @abstractmethod
     def now(self) -> float:
-        """The time since the driver was opened [s]."""
+        """Return the time since the driver was opened [s]."""
 
     def stop_after_fault(self) -> None:
         """Ask for the end of the run if the driver has found a fault."""
@@ -95,7 +93,7 @@ class DrivenRobot(Robot):
         return self.driver
 
     def metrics(self) -> Mapping[str, Metric]:
-        """What became of the drives; a fault is no success."""
+        """Return the outcome of the drives; a fault is no success."""
         if self.driver is None:
             return {}
         loop = self.driver.loop
@@ -111,7 +109,7 @@ class DrivenRobot(Robot):
 
 
 def read_hardware(name: str, context: Context, robot: RobotDescription) -> Hardware:
-    """The file of the hardware, relative to the graph's folder.
+    """Read the file of the hardware, relative to the graph's folder.
 
     Raises:
         HardwareError: there is none, or it has faults.

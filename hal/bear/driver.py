@@ -29,7 +29,7 @@ from .winding_heat import hot_winding
 
 
 class DriveLaw:
-    """What the drives are set to, and the goals that follow from it.
+    """The settings of the drives, and the goals that follow from them.
 
     A block makes it in ``setup``, before any port is open, so that the kernel of the goals is
     compiled with those of the graph.
@@ -59,9 +59,9 @@ class DriveLaw:
 
 
 LISTENING = 0.05
-"""How long the bus must be silent before anything is sent on it [s]."""
+"""Time for which the bus must be silent before anything is sent on it [s]."""
 _CLEARINGS = 6
-"""How often the torque is switched off to clear errors, as the maker's own program does."""
+"""Number of times the torque is switched off to clear errors, as the maker's own program does."""
 _RAMP = 0.2
 """The share of the soft start in which the current's limit rises to its full value."""
 
@@ -232,7 +232,7 @@ def soft_start(loop: MotorLoop, standing: Array, next_cycle: Callable[[], bool])
 
 
 STOP_CYCLES = 5
-"""How often damping is commanded at least, since an instruction may be lost."""
+"""Least number of damping commands, since an instruction may be lost."""
 _LOOK = 0.1
 """The time between two looks at the windings that cool down [s]."""
 _BOARD_CYCLES = 1000
@@ -288,13 +288,13 @@ class Driver:
     def arm(self, next_cycle: Callable[[], bool]) -> None:
         """Clear errors, configure, enable, and go to the standing pose; then the drives hold it.
 
-        The board is told to cool from here on.
+        The board cools from here on.
 
         Args:
             next_cycle: waits for the next cycle, and says whether to go on.
 
         Raises:
-            BusError: the text says which drive does not do what; nothing is left switched on.
+            BusError: the text names the drive and what it does not do; nothing is left switched on.
         """
         missing = self.hardware.missing_calibration()
         if missing:

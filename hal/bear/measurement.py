@@ -1,4 +1,4 @@
-"""What the drives and the sensor board measure, and whether the robot may go on driving."""
+"""Measurements of the drives and the sensor board, and the checks of whether the robot may go on driving."""
 
 from __future__ import annotations
 
@@ -23,10 +23,9 @@ READ = (
 
 
 PLAUSIBLE = ((-60.0, 60.0), (-200.0, 200.0), (-150.0, 150.0), (0.0, 80.0), (-40.0, 200.0))
-"""What a drive can measure [rad, rad/s, A, V, deg C]; anything else is damage."""
+"""Possible measurements of a drive [rad, rad/s, A, V, deg C]; anything else is damage."""
 LARGEST_STEP, FASTEST = 0.2, 100.0
-"""How far [rad] a position may be from the last one, beside what this speed [rad/s] gives in a
-period; only positions cannot jump."""
+"""Largest step of a position [rad], beside what this speed [rad/s] gives in a period; only positions cannot jump."""
 
 
 class Measurement:
@@ -44,7 +43,7 @@ class Measurement:
             delay of the commands would seem up to half a tick too short.
         specific_force: the mean over the packets since ``next_tick`` [m/s^2], (3,).
         angular_velocity: of the newest packet [rad/s], (3,).
-        samples: of every mounted sensor in a packet, by name; means where the sensor says so.
+        samples: of every mounted sensor in a packet, by name; means where the sensor is averaged.
         closed: the switches in the order of the robot's contact points, (n_contacts,).
     """
 
@@ -91,7 +90,7 @@ class Measurement:
             self._mean_torque()
 
     def show(self, bulk: BulkExchange) -> None:
-        """The newest values in the units and directions of the description."""
+        """Write the newest values in the units and directions of the description."""
         values = bulk.values
         np.multiply(values[:, 0], self.sign, out=self.position)
         np.subtract(self.position, self.offset, out=self.position)
@@ -103,8 +102,8 @@ class Measurement:
         self._transmission.joint_motion(self.velocity, self.joint_velocity)
 
     def sag(self) -> float:
-        """By how much [V] the pack's voltage is below that without load, from the work of the motors
-        and the heat of their windings."""
+        """Return the drop [V] of the pack's voltage below that without load, from the work of the motors and the heat
+        of their windings."""
         drives, current = self._drives, self.current
         np.multiply(self.torque_constant, current, out=self._scratch)
         work = float(np.dot(self._scratch, self.velocity))
@@ -158,7 +157,7 @@ class Measurement:
                 getattr(outputs[name], field)[...] = values
 
     def parts(self) -> list[tuple[object, tuple[str, ...]]]:
-        """What changes in a run: objects, and the names of their attributes."""
+        """Return the objects that change in a run, and the names of their attributes."""
         names = (
             "sum",
             "count",
@@ -172,12 +171,12 @@ class Measurement:
         return [(self, names), *((signal, tuple(signal.views())) for signal in signals)]
 
     def next_tick(self) -> None:
-        """The means of specific force and torques begin anew with what comes next."""
+        """Begin the means of specific force and torques anew with what comes next."""
         self.count = 0
         self.forget_torques()
 
     def forget_torques(self) -> None:
-        """The mean of the torques begins anew with the next exchange."""
+        """Begin the mean of the torques anew with the next exchange."""
         self.exchanges = 0
 
     def publish(self, imu: ImuReading, joints: JointState, contacts: ContactSwitches) -> None:
@@ -195,7 +194,7 @@ _MOVING = 1.0
 
 
 FOREIGN = 3
-"""So many instructions of somebody else mean a second writer: one may be damage that looks so."""
+"""Number of somebody else's instructions that mean a second writer: one may be damage that looks so."""
 
 
 class Supervision:
@@ -235,9 +234,9 @@ class Supervision:
         self.imu_valid = False
 
     def check_drives(self, measured: Measurement, bulk: BulkExchange, driving: bool) -> str:
-        """The first fault of the drives after an exchange; empty where there is none.
+        """Return the first fault of the drives after an exchange; empty where there is none.
 
-        ``driving`` says whether the drives are on: errors, voltages and stuck encoders of drives
+        ``driving`` is true if the drives are on: errors, voltages and stuck encoders of drives
         that are off hurt nobody.
         """
         settings, ages = self._hardware.drives, bulk.ages.tolist()
@@ -292,7 +291,7 @@ class Supervision:
         return ""
 
     def check_board(self, board: SenseBoard, fresh: int) -> str:
-        """The first fault of the board, of which ``fresh`` packets came with this exchange."""
+        """Return the first fault of the board, of which ``fresh`` packets came with this exchange."""
         settings = self._hardware.board
         self.imu_silent = 0 if fresh else self.imu_silent + 1
         if fresh:
@@ -322,8 +321,8 @@ class Supervision:
 def _first_lasting(
     values: NDArray[np.float64], limit: float, counts: NDArray[np.int64], most: int, sign: float
 ) -> int:
-    """The first value that has been beyond the limit (above for sign 1, below for -1) so many
-    times in a row; -1 where there is none."""
+    """Return the first value that has been beyond the limit (above for sign 1, below for -1) so many times in a row; -1
+    where there is none."""
     found = -1
     for k, value in enumerate(values.tolist()):
         counts[k] = count = int(counts[k]) + 1 if sign * value > sign * limit else 0

@@ -147,7 +147,8 @@ class MotorLoop:
         return answered
 
     def _poll_board(self) -> int:
-        """The number of new packets of the board. Its port is not the drives': without it they are damped."""
+        """Read the board, and return the number of its new packets. Its port is not the drives': without it they are
+        damped."""
         if self.board_lost:
             return 0
         try:
@@ -158,7 +159,7 @@ class MotorLoop:
             return 0
 
     def follow(self, command: JointCommand) -> None:
-        """From the next cycle on follow this command, if the drives are on."""
+        """Follow this command from the next cycle on, if the drives are on."""
         with self.lock:
             for name, values in command:
                 getattr(self.command, name)[...] = values
@@ -204,7 +205,7 @@ class MotorLoop:
         health.lost_answers[()] = self.lost_answers
 
     def parts(self) -> list[tuple[object, tuple[str, ...]]]:
-        """What changes in a run: objects, and the names of their attributes."""
+        """Return the objects that change in a run, and the names of their attributes."""
         found: list[tuple[object, tuple[str, ...]]] = [
             (self, ("phase", "cycles", "late_cycles", "lost_answers", "target", "current_limit",
                     "link_lost", "board_lost", "stamp", "exchange_in_use")),
@@ -228,7 +229,7 @@ class MotorLoop:
 
     @property
     def exchange_in_use(self) -> int:
-        """Which of the three exchanges was the last: 0 to watch, 1 to drive, 2 to damp."""
+        """The number of the last exchange: 0 to watch, 1 to drive, 2 to damp."""
         return (self._watch, self._drive, self._damp).index(self._last)
 
     @exchange_in_use.setter
@@ -245,7 +246,7 @@ class MotorLoop:
             self._last = bulk
 
     def _prepare(self) -> BulkExchange:
-        """The exchange that belongs to the phase, with its goals."""
+        """Return the exchange that belongs to the phase, with its goals."""
         measured = self.measured
         if self.phase is DrivePhase.DRIVING and self.command.mode[()] == CommandMode.DAMPING:
             self.phase = DrivePhase.DAMPED
@@ -296,7 +297,7 @@ class MotorLoop:
         np.subtract(scratch, feedback, out=goals.torque)
 
     def _fill(self, position: Array) -> None:
-        """The goals in the drives' units and directions, clamped to what they do not ignore."""
+        """Write the goals in the drives' units and directions, clamped to what they do not ignore."""
         measured, goals, out = self.measured, self.goals, self._drive.goals
         np.divide(goals.torque, measured.torque_constant, out=self._scratch)
         np.minimum(self._scratch, self._highest_current, out=self._scratch)
@@ -310,7 +311,7 @@ class MotorLoop:
 
 
 _SWITCHING = 2e-4
-"""How soon Python lets another thread run [s]; its default is five periods of the bus."""
+"""Time after which Python lets another thread run [s]; its default is five periods of the bus."""
 
 
 class MotorThread:
@@ -322,7 +323,7 @@ class MotorThread:
     Args:
         loop: the motor loop.
         command_age: how old a command may be [s].
-        objection: called before every cycle; a text that is not empty ends the driving.
+        stop_reason: called before every cycle; a text that is not empty ends the driving.
     """
 
     def __init__(self, loop: MotorLoop, command_age: float, stop_reason: Callable[[], str]) -> None:
@@ -407,7 +408,7 @@ class CommandQueue:
         tick: the graph's period [s]; it is a whole number of the bus's.
 
     Attributes:
-        commands: room for the commands on their way.
+        commands: memory for the commands on their way.
         sent: how many commands there were.
     """
 
@@ -439,6 +440,6 @@ class CommandQueue:
             self._loop.cycle()
 
     def parts(self) -> list[tuple[object, tuple[str, ...]]]:
-        """What changes in a run: objects, and the names of their attributes."""
+        """Return the objects that change in a run, and the names of their attributes."""
         found: list[tuple[object, tuple[str, ...]]] = [(self, ("sent",))]
         return found + [(command, tuple(command.views())) for command in self.commands]

@@ -49,12 +49,12 @@ class BusFrame:
 
 
 def checksum(body: bytes | bytearray | memoryview) -> int:
-    """The checksum of the bytes from the device's address to the last parameter."""
+    """Return the checksum of the bytes from the device's address to the last parameter."""
     return 255 - sum(body) % 256
 
 
 def frame_bytes(device: int, code: int, data: bytes = b"") -> bytes:
-    """The bytes of a frame.
+    """Return the bytes of a frame.
 
     Raises:
         ValueError: no actuator can have that address, or the frame would be too long.
@@ -96,7 +96,7 @@ class FrameReader:
         self._pending.clear()
 
     def feed(self, received: bytes | bytearray | memoryview) -> list[BusFrame]:
-        """The frames that are whole with these bytes, in the order of their arrival."""
+        """Return the frames that are whole with these bytes, in the order of their arrival."""
         pending = self._pending
         pending += received
         frames = []
@@ -122,7 +122,7 @@ class FrameReader:
         return frames
 
     def finish(self) -> list[BusFrame]:
-        """The whole frames inside one that has begun and that no more bytes will complete."""
+        """Return the whole frames inside one that has begun and that no more bytes will complete."""
         frames = []
         while self._pending:
             del self._pending[0]
@@ -132,7 +132,7 @@ class FrameReader:
 
 
 class Mode(IntEnum):
-    """What an actuator controls."""
+    """The quantity that an actuator controls."""
 
     TORQUE = 0
     VELOCITY = 1
@@ -173,7 +173,7 @@ class Register:
     most: float = float("inf")
 
     def pack(self, value: float) -> bytes:
-        """The value's 4 bytes. Raises ``ValueError`` where it cannot be written."""
+        """Return the value's 4 bytes. Raises ``ValueError`` where it cannot be written."""
         if self.kind == "f32":
             return struct.pack("<f", value)
         if value != int(value) or not 0 <= value < 2**32:
@@ -181,7 +181,7 @@ class Register:
         return struct.pack("<I", int(value))
 
     def unpack(self, data: bytes | memoryview) -> float | int:
-        """The value of 4 bytes."""
+        """Return the value of 4 bytes."""
         found: float | int = struct.unpack("<f" if self.kind == "f32" else "<I", data)[0]
         return found
 

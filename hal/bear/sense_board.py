@@ -22,9 +22,9 @@ LENGTH = 0x1B
 PACKET = 29
 """Bytes of a packet without mounted sensors."""
 LONGEST = 250
-"""The most that a packet's length may say: 0xFE and 0xFF end and begin packets."""
+"""The largest value of a packet's length: 0xFE and 0xFF end and begin packets."""
 _SENSORS = 27
-"""Where the numbers of mounted sensors begin in a packet."""
+"""Offset of the numbers of mounted sensors in a packet."""
 CALIBRATION = 0xFF
 """The switches' byte of a packet that tells of a calibration."""
 SWITCHES = ("right_toe", "right_heel", "left_toe", "left_heel")
@@ -44,7 +44,7 @@ class BoardMode(IntEnum):
 
 
 def command_bytes(mode: BoardMode, cooling: int = 0) -> bytes:
-    """The command for the board: its mode, and the cooling pump's and fan's strength, 0 to 10.
+    """Return the command for the board: its mode, and the cooling pump's and fan's strength, 0 to 10.
 
     Raises:
         ValueError: there is no such strength.

@@ -20,15 +20,15 @@ from .protocol import BROADCAST, STATUS, Instruction, Torque, frame_bytes
 from .watchdog_process import ASKED, CLOSING, SIZE, TRIPPED, UNTIL
 
 _STARTING = 10.0
-"""How long the process may take to start [s]."""
+"""Longest time for the process to start [s]."""
 _ANSWERING = 0.5
-"""How long a run may take to answer that it has stopped [s]."""
+"""Longest time for a run to answer that it has stopped [s]."""
 _ENDING = 5.0
-"""How long it may take to end, once it is told to [s]."""
+"""Longest time for the process to end, once it is asked to [s]."""
 
 
 def damping_frame(devices: list[int]) -> bytes:
-    """The instruction that puts all these drives into damping; nobody answers it."""
+    """Return the instruction that puts all these drives into damping; nobody answers it."""
     register = STATUS["torque_enable"]
     goals = b"".join(bytes((device,)) + register.pack(Torque.DAMPING) for device in devices)
     head = bytes((len(devices), 0x01, register.address))
@@ -88,7 +88,7 @@ class DriveWatchdog:
         return self._process.pid
 
     def beat(self, last_command: int = 0) -> None:
-        """The graph is alive.
+        """Note that the graph is alive.
 
         ``last_command`` says when commands last came from another machine, by the monotonic clock [ns];
         zero where they are made here. So the process notices silent links although this one hangs.
@@ -100,12 +100,12 @@ class DriveWatchdog:
 
     @property
     def tripped(self) -> bool:
-        """Whether it has taken over and damps."""
+        """True if it has taken over and damps."""
         return bool(self._read(TRIPPED))
 
     @property
     def asked(self) -> bool:
-        """Whether somebody has asked it to stop, and it has damped the drives once."""
+        """True if somebody has asked it to stop, and it has damped the drives once."""
         return bool(self._read(ASKED))
 
     def close(self) -> None:
@@ -119,7 +119,7 @@ class DriveWatchdog:
 
 
 def ask_to_stop(port: str) -> bool:
-    """Ask the run that holds this port to damp its drives; says whether one has."""
+    """Ask the run that holds this port to damp its drives; return whether one has."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as ours:
         ours.bind("")  # an address to answer to
         ours.settimeout(_ANSWERING)
@@ -131,7 +131,7 @@ def ask_to_stop(port: str) -> bool:
 
 
 def _stop_address(port: str) -> bytes:
-    """The abstract socket that belongs to a port: it vanishes with the processes that have it."""
+    """Return the abstract socket that belongs to a port: it vanishes with the processes that have it."""
     return b"\0aloft drives " + os.path.realpath(port).encode()
 
 
@@ -146,7 +146,7 @@ class DeadMansSwitch(Protocol):
     """Something that is held or let go."""
 
     def held(self) -> bool:
-        """Whether it is held now; it waits for nothing."""
+        """Check whether it is held now, without waiting."""
 
     def close(self) -> None:
         """Give the device back."""
@@ -182,7 +182,7 @@ class GamepadButton:
         self._held = False
 
     def held(self) -> bool:
-        """Whether the button is down."""
+        """Check whether the button is down."""
         try:
             while len(event := os.read(self._file, _EVENT.size)) == _EVENT.size:
                 _, value, kind, number = _EVENT.unpack(event)
@@ -220,7 +220,7 @@ class SpaceBar:
         self._repeats = False
 
     def held(self) -> bool:
-        """Whether it has repeated itself a moment ago."""
+        """Check whether it has repeated itself a moment ago."""
         now = time.monotonic()
         recent = now - self._last < _KEY_TIME
         pressed = 0
@@ -240,7 +240,7 @@ class SpaceBar:
 
 
 def open_switch(settings: DeadMan) -> DeadMansSwitch:
-    """The switch of a hardware's file. Raises ``BusError``."""
+    """Open the switch of a hardware's file. Raises ``BusError``."""
     if settings.kind == "gamepad":
         return GamepadButton(settings.device, settings.button)
     return SpaceBar() if settings.kind == "key" else AlwaysHeld()

@@ -17,15 +17,15 @@ import time
 from contextlib import suppress
 
 UNTIL, TRIPPED, CLOSING, ASKED = 0, 8, 16, 24
-"""Where each unsigned number of 8 bytes lies in the shared memory. The first is the time until which
-the graph may be left alone, by the monotonic clock [ns]; zero before there is one."""
+"""Offsets of the unsigned numbers of 8 bytes in the shared memory. The first is the time until which the graph may be
+left alone, by the monotonic clock [ns]; zero before there is one."""
 SIZE = 32
 LASTING = 2.0
-"""For how long damping is commanded again and again [s]."""
+"""Time for which damping is commanded again and again [s]."""
 
 
 def main() -> int:
-    """Watch until the graph says that it closes, or until it hangs or has died."""
+    """Watch until the graph closes, hangs or dies."""
     parents_socket, port, memory, stops = map(int, sys.argv[1:5])
     frame = bytes.fromhex(sys.argv[5])
     parent = os.getppid()

@@ -1,4 +1,4 @@
-"""What a jump heats the windings, and how long they must cool before it may be made.
+"""Temperature rise of the motor windings in a jump, and their cooling time before it.
 
 A jump's copper heat follows from the torques of its plan, by the motor's own torque constant k and the
 resistance R at its temperature, and warms the winding's heat capacity C; cooling meanwhile is left out::
@@ -44,7 +44,7 @@ class HotWinding:
     wait: float | None
 
     def __str__(self) -> str:
-        """The winding in words."""
+        """Return the winding in words."""
         what = "the plan" if self.planned else "a jump (`drives.jump_heating`)"
         end = self.temperature + self.rise
         return (
@@ -62,7 +62,7 @@ class HotWinding:
 def rise_of(
     hardware: Hardware, motor: str, temperature: float, load: Mapping[str, float] | None
 ) -> float:
-    """By how much the next jump heats a winding [K].
+    """Return the temperature rise of a winding in the next jump [K].
 
     Args:
         temperature: of the winding [deg C].
@@ -77,7 +77,7 @@ def rise_of(
 
 
 def cooling_time(hardware: Hardware, temperature: float, wanted: float) -> float | None:
-    """The time in which a winding cools to a wanted temperature [s]; ``None`` if it never does."""
+    """Return the time in which a winding cools to a wanted temperature [s]; ``None`` if it never does."""
     drives = hardware.drives
     if temperature <= wanted:
         return 0.0
@@ -91,7 +91,7 @@ def cooling_time(hardware: Hardware, temperature: float, wanted: float) -> float
 def hot_winding(
     hardware: Hardware, motor: str, temperature: float, load: Mapping[str, float] | None
 ) -> HotWinding | None:
-    """The winding of a motor if the next jump would overheat it; arguments as for ``rise_of``."""
+    """Return the winding of a motor if the next jump would overheat it; arguments as for ``rise_of``."""
     limit, rise = hardware.drives.highest_temperature, rise_of(hardware, motor, temperature, load)
     if temperature + rise <= limit:
         return None

@@ -28,7 +28,7 @@ class JointSensors(Sensor):
 
 @kernel
 def count_bouncing(step: Indices0D, bounce_end: Indices1D, count: Indices1D) -> None:
-    """How many switches chatter in a physics step: ``step`` without a dimension, ``count`` (1,)."""
+    """Count the switches that chatter in a physics step: ``step`` without a dimension, ``count`` (1,)."""
     count[0] = 0
     for point in range(bounce_end.shape[0]):
         if step[()] < bounce_end[point]:
@@ -44,7 +44,7 @@ def sample_switches(
     draws: Array1D,
     closed: Flags1D,
 ) -> None:
-    """A sample of the switches that the robot may have (``present``).
+    """Take a sample of the switches that the robot may have (``present``).
 
     Args:
         step, bounce_end: as for ``count_bouncing``.
@@ -69,7 +69,7 @@ class SwitchSensors(Sensor):
 
     @staticmethod
     def draw_thresholds(limits: list[float], count: int, draws: np.random.Generator) -> Array:
-        """The force that closes every switch [N], (count,), between the two ``limits``."""
+        """Draw the force that closes every switch [N], (count,), between the two ``limits``."""
         low, high = limits
         return low + (high - low) * draws.random(count)
 

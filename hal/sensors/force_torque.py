@@ -29,7 +29,7 @@ def read_wrench(
     net_force: Vector3, net_torque: Vector3, centre: Vector3, origin: Vector3, rotation: Matrix3,
     force: Vector3, torque: Vector3,
 ) -> None:  # fmt: skip
-    """The wrench on a link, in the sensor's axes, from that with which the link acts on the world.
+    """Compute the wrench on a link, in the sensor's axes, from that with which the link acts on the world.
 
     Args:
         net_force, net_torque: on the world [N, N m, world], about ``centre`` [m, world].

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @kernel
 def read_imu(gyroscope: Vector3, accelerometer: Vector3, rate: Vector3, force: Vector3) -> None:
-    """The angular velocity [rad/s] and the specific force [m/s^2] at a site."""
+    """Read the angular velocity [rad/s] and the specific force [m/s^2] at a site."""
     rate[:] = gyroscope
     force[:] = accelerometer
 

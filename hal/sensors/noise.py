@@ -36,7 +36,7 @@ class NoiseModel(Parameters):
     )
 
     def scaled(self, factor: float) -> NoiseModel:
-        """The model with ``factor`` times the noise and the bias; 0: no errors of any kind."""
+        """Return the model with ``factor`` times the noise and the bias; 0: no errors of any kind."""
         if factor == 0.0:
             return NoiseModel()
         return self.model_copy(update={"noise": factor * self.noise, "bias": factor * self.bias})
@@ -121,8 +121,8 @@ class FieldErrors:
 def delay_sample(
     sample: Array1D, ring: Array2D, taken: Indices1D, delay: Indices1D, reading: Array1D
 ) -> None:
-    """Put a ``sample`` (n,) into a ring of past ones, and write the ``reading`` (n,) that is late; before
-    the first samples there was what the first one says.
+    """Put a ``sample`` (n,) into a ring of past ones, and write the ``reading`` (n,) that is late; before the first
+    samples it is the first one.
 
     Args:
         ring: past samples, (slots, n), of which slot ``taken % slots`` is written next.

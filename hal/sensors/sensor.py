@@ -1,6 +1,6 @@
-"""What a sensor is, and how the sensors of a robot's description are found.
+"""The sensors of a robot, and the lookup of those in its description.
 
-A sensor is one class in one file of this folder, or of a user's own module. It says
+A sensor is one class in one file of this folder, or of a user's own module. It declares
 
 * what it measures: the ``signal`` that the robot publishes at an output called as the sensor;
 * what the robot's YAML may set for it: ``Settings``, beside where it is mounted;
@@ -42,7 +42,7 @@ from ...files.validation import describe
 from ...mathematics.arrays import Array
 from ...mathematics.compiling.call_sequence import Call
 from ...robots.description import RobotDescription
-from ...robots.robot_description import MountedSensorPart
+from ...robots.robot_description import SensorMount
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.registry import find_class
@@ -56,11 +56,11 @@ _PACKAGE = __name__.rpartition(".")[0]
 
 
 class SensorError(BlockError):
-    """A robot's description has a sensor that cannot be; the text says which, and why."""
+    """A robot's description has a sensor that cannot be; the text names it, and the reason."""
 
 
 class SensorSettings(Parameters):
-    """What a robot's YAML may set for a sensor, beside its kind and where it is mounted."""
+    """The settings of a sensor in a robot's YAML, beside its kind and its mounting."""
 
     noise: dict[str, NoiseModel] = parameter({}, text="the errors of each field, by its name")
 
@@ -82,7 +82,7 @@ class Arrow:
 
 
 class Sensor(ABC):
-    """A sensor of a robot. Class attributes say what is common to all sensors of a kind.
+    """A sensor of a robot. Class attributes are common to all sensors of a kind.
 
     Args:
         name: of the sensor, and of the robot's output.
@@ -92,7 +92,7 @@ class Sensor(ABC):
     kind: ClassVar[str] = ""
     """The name of the kind in a robot's YAML."""
     signal: ClassVar[type[Signal]]
-    """What it measures."""
+    """The signal that it measures."""
     averaged: ClassVar[tuple[str, ...]] = ()
     """The fields whose reading is the mean since the last sample, as behind a filter that passes nothing
     faster; the reading of other fields is the value at the instant of the sample."""
@@ -101,7 +101,7 @@ class Sensor(ABC):
     ros2: ClassVar[RosMessage | None] = None
     """The message that ROS 2's tools know; none: its numbers only."""
     drawn: ClassVar[Arrow | None] = None
-    """How it is drawn in 3D; none: it is plotted only."""
+    """Its arrow in the 3D view; none: it is plotted only."""
 
     def __init__(self, name: str, dimensions: Mapping[str, int] | None = None) -> None:
         self.name = name
@@ -114,7 +114,7 @@ class Sensor(ABC):
     def reading(
         self, true: Mapping[str, Array], errors: Mapping[str, FieldErrors], out: Signal
     ) -> list[Call]:
-        """The calls that write a sample to ``out``: the ``true`` value of every field, (n,), with its
+        """Return the calls that write a sample to ``out``: the ``true`` value of every field, (n,), with its
         ``errors``."""
         found: list[Call] = []
         for field in self.signal.fields:
@@ -122,11 +122,11 @@ class Sensor(ABC):
         return found
 
     def packet_size(self) -> int:
-        """The bytes of a sample in a packet."""
+        """Return the bytes of a sample in a packet."""
         return 4 * sum(self.sizes[name] for name in self.packet_fields or self.signal.fields)
 
     def to_packet(self, values: Signal) -> bytes:
-        """A sample as a packet carries it: float32, little-endian, one field behind the other."""
+        """Pack a sample as a packet carries it: float32, little-endian, one field behind the other."""
         fields = self.packet_fields or tuple(self.signal.fields)
         numbers = [x for name in fields for x in np.ravel(getattr(values, name)).tolist()]
         return struct.pack(f"<{len(numbers)}f", *numbers)
@@ -145,7 +145,7 @@ class MountedSensor(Sensor):
 
     Args:
         name: of the sensor, and of the robot's output.
-        part: the sensor's entry in the description.
+        mount: the sensor's entry in the description.
 
     Raises:
         SensorError: the entry sets something that this kind of sensor does not have.
@@ -158,18 +158,18 @@ class MountedSensor(Sensor):
 
     Settings: ClassVar[type[SensorSettings]] = SensorSettings
 
-    def __init__(self, name: str, part: MountedSensorPart) -> None:
+    def __init__(self, name: str, mount: SensorMount) -> None:
         super().__init__(name)
-        self.link, self.position = part.link, part.position
-        length = math.sqrt(sum(x * x for x in part.orientation))
+        self.link, self.position = mount.link, mount.position
+        length = math.sqrt(sum(x * x for x in mount.orientation))
         if not 0.0 < length < math.inf:
             raise SensorError(
                 f"sensor {name}: orientation is a quaternion x, y, z, w that is not zero, not "
-                f"{list(part.orientation)}"
+                f"{list(mount.orientation)}"
             )
-        self.orientation = tuple(x / length for x in part.orientation)
+        self.orientation = tuple(x / length for x in mount.orientation)
         try:
-            self.settings = self.Settings.model_validate(dict(part.model_extra or {}))
+            self.settings = self.Settings.model_validate(dict(mount.model_extra or {}))
         except ValidationError as error:
             first = describe(error.errors(include_url=False)[0], self.Settings)
             known = ", ".join(self.Settings.model_fields)
@@ -184,7 +184,7 @@ class MountedSensor(Sensor):
                 )
 
     def noise(self, field: str) -> NoiseModel:
-        """The errors of a field."""
+        """Return the errors of a field."""
         return self.settings.noise.get(field, NoiseModel())
 
     @property
@@ -199,12 +199,12 @@ class MountedSensor(Sensor):
 
     @abstractmethod
     def from_mujoco(self, model: MjModel, data: MjData, out: Mapping[str, Array]) -> list[Call]:
-        """The calls that write the true value of every field to ``out`` after a physics step. They may
-        keep views of the simulator's memory."""
+        """Return the calls that write the true value of every field to ``out`` after a physics step. They may keep
+        views of the simulator's memory."""
 
 
 def find_sensor(kind: str, folder: Path | None = None) -> type[MountedSensor]:
-    """The class of a kind of sensor, or the one that ``module:Class`` names.
+    """Find the class of a kind of sensor, or the one that ``module:Class`` names.
 
     Args:
         folder: a folder in which a user's module is searched for.
@@ -233,7 +233,7 @@ _found: dict[str, type[MountedSensor]] = {}
 
 
 def sensor_kinds() -> dict[str, type[MountedSensor]]:
-    """The kinds of sensors of this folder that a description can mount on a link."""
+    """Return the kinds of sensors of this folder that a description can mount on a link."""
     modules = [
         import_module(f"{_PACKAGE}.{module.name}")
         for module in iter_modules([str(Path(__file__).parent)])
@@ -249,22 +249,22 @@ def sensor_kinds() -> dict[str, type[MountedSensor]]:
 def mounted_sensors(
     robot: RobotDescription | None, folder: Path | None = None
 ) -> tuple[MountedSensor, ...]:
-    """The sensors that a robot's description mounts on its links, in its order.
+    """Return the sensors that a robot's description mounts on its links, in its order.
 
     Raises:
         SensorError: there is no such kind or link, or a setting is wrong.
     """
     found: list[MountedSensor] = []
-    for name, part in robot.sensors.mounted.items() if robot is not None else ():
+    for name, mount in robot.sensors.mounted.items() if robot is not None else ():
         assert robot is not None
         links = [link.name for link in robot.links]
-        if part.link not in links:
-            near = get_close_matches(part.link, links, 1)
+        if mount.link not in links:
+            near = get_close_matches(mount.link, links, 1)
             hint = f"; did you mean {near[0]}?" if near else ""
-            raise SensorError(f"sensor {name}: {robot.name} has no link {part.link!r}{hint}")
+            raise SensorError(f"sensor {name}: {robot.name} has no link {mount.link!r}{hint}")
         try:
-            kind = find_sensor(part.kind, folder)
+            kind = find_sensor(mount.kind, folder)
         except SensorError as error:
             raise SensorError(f"sensor {name}: {error}") from error
-        found.append(kind(name, part))
+        found.append(kind(name, mount))
     return tuple(found)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @kernel
 def report_fixed(truth: RobotTruth) -> None:
-    """The pose and velocity of a base at the world's origin."""
+    """Report the pose and velocity of a base at the world's origin."""
     truth.base_position[:] = 0.0
     truth.base_orientation[:] = 0.0
     truth.base_orientation[3] = 1.0
@@ -30,7 +30,7 @@ def report_fixed(truth: RobotTruth) -> None:
 
 @kernel
 def report_planar(position: Array1D, velocity: Array1D, truth: RobotTruth) -> None:
-    """The pose and velocity of a base whose coordinates in the simulator are x, z and the pitch."""
+    """Report the pose and velocity of a base whose coordinates in the simulator are x, z and the pitch."""
     half = 0.5 * position[2]
     report_fixed(truth)
     truth.base_position[0], truth.base_position[2] = position[0], position[1]
@@ -41,7 +41,7 @@ def report_planar(position: Array1D, velocity: Array1D, truth: RobotTruth) -> No
 
 @kernel
 def report_floating(position: Array1D, velocity: Array1D, truth: RobotTruth) -> None:
-    """The pose and velocity of a base whose coordinates are position and quaternion w, x, y, z."""
+    """Report the pose and velocity of a base whose coordinates are position and quaternion w, x, y, z."""
     for axis in range(3):
         truth.base_position[axis] = position[axis]
         truth.base_orientation[axis] = position[4 + axis]
@@ -52,14 +52,14 @@ def report_floating(position: Array1D, velocity: Array1D, truth: RobotTruth) -> 
 
 @kernel
 def read_pitch_rate(velocity: Array1D, rate: Array1D) -> None:
-    """The angular velocity (3,) [rad/s, body] of a planar base, from the simulator's velocities."""
+    """Read the angular velocity (3,) [rad/s, body] of a planar base, from the simulator's velocities."""
     rate[1] = velocity[2]
 
 
 class FixedBase:
     """A base that is bolted to the world at its origin: it has no coordinates.
 
-    ``positions`` and ``velocities`` say how many elements of the simulator's ``qpos`` and ``qvel``
+    ``positions`` and ``velocities`` count the elements of the simulator's ``qpos`` and ``qvel``
     the base takes; those of the joints follow.
     """
 
@@ -88,11 +88,11 @@ class FixedBase:
         """Bring ``angular_velocity`` up to date."""
 
     def refreshing(self) -> list[KernelCall]:
-        """The calls of ``refresh``."""
+        """Return the calls of ``refresh``."""
         return []
 
     def publishing(self, truth: RobotTruth) -> KernelCall:
-        """Writes the base's pose and velocity."""
+        """Return the call that writes the base's pose and velocity."""
         return signal_call(report_fixed, truth)
 
 
@@ -130,11 +130,11 @@ class PlanarBase(FixedBase):
         read_pitch_rate(self._data.qvel, self.angular_velocity)
 
     def refreshing(self) -> list[KernelCall]:
-        """The calls of ``refresh``."""
+        """Return the calls of ``refresh``."""
         return [KernelCall(read_pitch_rate, self._data.qvel, self.angular_velocity)]
 
     def publishing(self, truth: RobotTruth) -> KernelCall:
-        """Writes the base's pose and velocity."""
+        """Return the call that writes the base's pose and velocity."""
         return signal_call(report_planar, self._data.qpos, self._data.qvel, truth)
 
 
@@ -172,7 +172,7 @@ class FloatingBase(FixedBase):
         self._data.qpos[:3] += offset
 
     def publishing(self, truth: RobotTruth) -> KernelCall:
-        """Writes the base's pose and velocity."""
+        """Return the call that writes the base's pose and velocity."""
         return signal_call(report_floating, self._data.qpos, self._data.qvel, truth)
 
 

@@ -44,7 +44,7 @@ class Pack(NamedTuple):
 
 @kernel
 def draw_power(pack: Pack, scratch: MotorScratch, memory: PhysicsState) -> None:
-    """The voltage after a physics step with these motor torques and speeds.
+    """Compute the voltage after a physics step with these motor torques and speeds.
 
     ``memory.battery`` holds the voltage [V], the charge that is gone [C], the voltage that is still to
     recover [V], and the current [A].
@@ -75,7 +75,7 @@ def draw_power(pack: Pack, scratch: MotorScratch, memory: PhysicsState) -> None:
 
 @kernel
 def limit_by_voltage(pack: Pack, motors: DriveTrain, memory: PhysicsState) -> None:
-    """What the motors can do at the pack's voltage."""
+    """Limit the motors to the torques that they can give at the pack's voltage."""
     ratio = max(memory.battery[0] / pack.rated_voltage, 0.05)
     for k in range(pack.no_load.shape[0]):
         motors.no_load[k] = pack.no_load[k] * ratio
@@ -116,7 +116,7 @@ class Battery:
         )  # fmt: skip
 
     def begin(self) -> None:
-        """The pack is full and has rested."""
+        """Begin with a pack that is full and has rested."""
         self._memory.battery[:] = [self._supply.open_voltage, 0.0, 0.0, 0.0]
 
     @property
@@ -126,9 +126,9 @@ class Battery:
         return found
 
     def feeding(self, limits: MotorLimits) -> KernelCall:
-        """Feeds the motors in a physics step."""
+        """Return the call that feeds the motors in a physics step."""
         return signal_call(draw_power, self._pack, limits.scratch, self._memory)
 
     def limiting(self, limits: MotorLimits) -> KernelCall:
-        """Sets what the motors can do at the present voltage, before a physics step."""
+        """Return the call that sets the motors' limits at the present voltage, before a physics step."""
         return signal_call(limit_by_voltage, self._pack, limits.motors, self._memory)

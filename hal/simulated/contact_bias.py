@@ -4,7 +4,7 @@ A point that stands obeys J q'' + J' q' = 0. MuJoCo asks of a contact J q'' = a 
 a = -b v for friction, and has no J' q'. So a sole stands below moving legs only while it slides, however high the friction is,
 at the speed v = J' q' / b [m/s] with b = 2 / (0.99 T), T being the contact's time constant [s]: on soft ground G1's
 at 60 to 90 mm/s when a thrust ends, with horizontal forces of a thirtieth of the load. Between the two parts of a physics step
-J' q' is taken from the references of all contacts of a sphere with the ground, so that they mean what they say.
+J' q' is taken from the references of all contacts of a sphere with the ground, so that they keep their meaning.
 
 For a sphere with the centre c that touches at p the velocity of the contact is that of its material there, v_c + w x (p - c),
 and p - c does not change as it rolls. So its bias is that of the centre plus (J'_w q') x (p - c).
@@ -53,7 +53,7 @@ class ContactBias:
                 body = int(model.body_parentid[body])
 
     def begin_step(self) -> None:
-        """The first part of a physics step."""
+        """Make the first part of a physics step."""
         self._begin()
         self.correct()
 
@@ -76,8 +76,8 @@ class ContactBias:
         data.efc_aref[places] -= np.where(into, 1.0, -1.0)[chosen][:, None] * along
 
     def bias(self, balls: Indices, places: Array) -> Array:
-        """The bias accelerations (n, 3) [m/s^2, world] of the contacts of the geoms ``balls`` (n,), which touch at
-        ``places`` (n, 3) [m, world]."""
+        """Return the bias accelerations (n, 3) [m/s^2, world] of the contacts of the geoms ``balls`` (n,), which touch
+        at ``places`` (n, 3) [m, world]."""
         data = self._data
         rates = data.cdof_dot * data.qvel[:, None]
         spatial = np.add.reduce(self._moved_by[balls][:, :, None] * rates, axis=1)

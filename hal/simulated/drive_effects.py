@@ -1,4 +1,4 @@
-"""What is not ideal in the drives of a simulated robot: encoders, gears, current loops and motors.
+"""Imperfections of the drives of a simulated robot: encoders, gears, current loops and motors.
 
 Between two physics steps a drive reads its encoder, closes its loop (``drives.py``), and asks its motor
 for a torque. Here the encoder sits on the motor, behind a gear that yields under load and has play; its
@@ -123,11 +123,11 @@ def produce_torque(
     position: Array1D, velocity: Array1D, requested: Array1D, model: DrawnMotors,
     scratch: ProducedTorque, memory: PhysicsState, torque: Array1D,
 ) -> None:  # fmt: skip
-    """Change the joint ``torque`` [N m] from what the motors are asked for to what they give.
+    """Change the joint ``torque`` [N m] from the commanded one to that of the motors.
 
     Args:
         position, velocity: the true motion of the joints [rad, rad/s].
-        requested: the torques that are asked of the motors [N m].
+        requested: the commanded torques of the motors [N m].
     """
     multiply_vector(model.to_motor, position, scratch.angle)
     multiply_vector(model.to_motor, velocity, scratch.speed)
@@ -207,7 +207,7 @@ class DriveEffects:
         timestep: float,
         windings: WindingParameters | None = None,
     ) -> Mapping[str, int]:
-        """The sizes of what is kept in ``PhysicsState``."""
+        """Return the sizes of what is kept in ``PhysicsState``."""
         n = len(robot.joints)
         sensed = encoders != EncoderEffects()
         return {
@@ -218,7 +218,7 @@ class DriveEffects:
         }
 
     def sensing(self, position: Array, velocity: Array, torque: Array) -> KernelCall:
-        """Reads the encoders after a physics step; arguments as for ``sense_joints``."""
+        """Return the call that reads the encoders after a physics step; arguments as for ``sense_joints``."""
         n = self._count
         scratch = EncoderScratch(np.zeros(n), np.zeros(n), np.zeros(1, np.int64))
         return signal_call(
@@ -228,7 +228,7 @@ class DriveEffects:
     def producing(
         self, position: Array, velocity: Array, requested: Array, torque: Array
     ) -> KernelCall:
-        """Makes of what is asked of the motors what they give; arguments as for ``produce_torque``."""
+        """Return the call that makes the motors' torque of the commanded one; arguments as for ``produce_torque``."""
         scratch = ProducedTorque(*(np.zeros(self._count) for _ in ProducedTorque._fields))
         return signal_call(
             produce_torque, position, velocity, requested, self._motors, scratch, self._memory,
@@ -236,7 +236,7 @@ class DriveEffects:
         )  # fmt: skip
 
     def metrics(self) -> Mapping[str, float]:
-        """The weakest and the strongest motor."""
+        """Return the weakest and the strongest motor."""
         return {
             "robot_least_torque_constant": float(self.torque_constant.min()),
             "robot_largest_torque_constant": float(self.torque_constant.max()),

@@ -33,7 +33,7 @@ from .state import DriveState, TickRecord, update_maximum, update_minimum
 
 
 class DriveTrain(NamedTuple):
-    """What the motors of a robot can do, and how they move its joints.
+    """Limits of a robot's motors, and their transmission to the joints.
 
     ``joint_to_motor``, ``torque_to_motor`` and ``motor_to_torque``, each (n, n), map joint
     velocities to motor speeds, joint torques to motor torques, and motor torques to joint torques.
@@ -50,12 +50,12 @@ class DriveTrain(NamedTuple):
 
 
 class MotorScratch(Signal):
-    """What the motors do in the present physics step."""
+    """Torques and speeds of the motors in the present physics step."""
 
     speed = Field("n_joints", unit="rad/s", text="their speeds")
     lower = Field("n_joints", unit="N m", text="their lower torque limits")
     upper = Field("n_joints", unit="N m", text="their upper torque limits")
-    requested = Field("n_joints", unit="N m", text="torques that are asked of them")
+    requested = Field("n_joints", unit="N m", text="commanded torques of the joints")
     torque = Field("n_joints", unit="N m", text="torques that they produce")
 
 
@@ -109,7 +109,7 @@ def clip_joint_torque(
 ) -> None:
     """Limit the joint ``torque`` [N m] to what the motors can produce.
 
-    ``motor_requested`` receives the motor torques that are asked for, and ``motor_torque`` those that
+    ``motor_requested`` receives the commanded motor torques, and ``motor_torque`` those that
     are produced, within ``lower`` and ``upper``. ``torque_to_motor`` is the inverse of
     ``motor_to_torque``, which is the transpose of ``joint_to_motor``. What is not a number stays so.
     """
@@ -130,8 +130,8 @@ def drive_motors(
     scratch: MotorScratch,
     record: TickRecord,
 ) -> None:
-    """Limit the joint ``torque`` [N m] at the joint ``velocity`` [rad/s] in place, and record how near
-    the motors come to their limits. Of what is not a number the record says so too."""
+    """Limit the joint ``torque`` [N m] at the joint ``velocity`` [rad/s] in place, and record how near the motors come
+    to their limits, and torques that are not a number."""
     multiply_vector(motors.joint_to_motor, velocity, scratch.speed)
     motor_torque_limits(
         scratch.speed, motors.peak, motors.slope, motors.no_load, scratch.lower, scratch.upper
@@ -154,9 +154,9 @@ def drive_motors(
 
 
 class Joints(NamedTuple):
-    """What the drives of all joints read and give in a physics step: the count of the step, without a
-    dimension, whether a command has ``arrived`` in it, (1,), the ``position`` that their encoders read [rad], the ``velocity`` [rad/s] and the ``torque`` [N m],
-    each (n_joints,)."""
+    """Readings and torques of all joints' drives in a physics step: the count of the step, without a dimension, whether
+    a command has ``arrived`` in it, (1,), the ``position`` that their encoders read [rad], the ``velocity`` [rad/s] and
+    the ``torque`` [N m], each (n_joints,)."""
 
     step: Indices0D
     arrived: Flags1D
@@ -205,7 +205,7 @@ def drive_joints(
     scratch: MotorScratch,
     record: TickRecord,
 ) -> None:
-    """The joint torques of a physics step: what the commands ask for, as far as the motors can."""
+    """Compute the joint torques of a physics step: those of the commands, as far as the motors can give them."""
     follow_commands(commands, released, joints)
     drive_motors(joints.speed, joints.torque, motors, scratch, record)
 
@@ -220,7 +220,8 @@ def drive_loops(
     scratch: MotorScratch,
     record: TickRecord,
 ) -> None:
-    """As ``drive_joints``, but once a command has arrived each drive closes the loop of its motor."""
+    """Compute the joint torques as ``drive_joints``, but once a command has arrived each drive closes the loop of its
+    motor."""
     follow_commands(commands, released, joints)
     active = commands.active
     if commands.mode[active] == CommandMode.ACTIVE:
@@ -265,8 +266,8 @@ def send_command(
 
 
 class MotorLimits:
-    """What ``drive_motors`` needs to limit joint torques to what the motors can do at their speed, and
-    to record how near they come to it."""
+    """Memory of ``drive_motors`` to limit joint torques to those that the motors can give at their speed, and to record
+    how near they come to it."""
 
     def __init__(self, robot: RobotDescription, record: TickRecord) -> None:
         motors = robot.motors
@@ -317,7 +318,7 @@ class SimulatedDrives:
     def torque_call(
         self, step: Counts, position: Array, velocity: Array, speed: Array, out: Array
     ) -> KernelCall:
-        """Writes the joint torques [N m] during a physics step to ``out``, (n_joints,).
+        """Return the call that writes the joint torques [N m] during a physics step to ``out``, (n_joints,).
 
         Args:
             step: the count of the step, without a dimension.
@@ -357,5 +358,5 @@ class SimulatedDrives:
         self._state.mode[int(self._state.active)] = CommandMode.DAMPING
 
     def sending(self, command: JointCommand, step: Counts, latency: CommandLatency) -> KernelCall:
-        """Sends a command in the physics step ``step``, a count without a dimension."""
+        """Return the call that sends a command in the physics step ``step``, a count without a dimension."""
         return signal_call(send_command, command, step, latency, self._state)

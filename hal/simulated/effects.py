@@ -1,4 +1,4 @@
-"""What a simulated robot can have that its description does not say: the parameters of all effects.
+"""Effects of a simulated robot beyond its description: the parameters of all of them.
 
 How each effect is computed stands in the file that uses its parameters: ``imu_effects.py``, ``drive_effects.py``,
 ``gears.py``, ``battery.py``, ``windings.py``, ``switch_effects.py``, ``gantry.py``, ``joint_effects.py`` and ``variation.py``. A check of a graph needs none
@@ -16,7 +16,7 @@ from ...runtime.language.parameters import Parameters, ThreeNumbers, TwoNumbers,
 
 
 class ImuEffects(Parameters):
-    """What is not ideal in a simulated IMU, besides noise, bias and range; by default nothing."""
+    """Imperfections of a simulated IMU, besides noise, bias and range; by default none."""
 
     gyro_delay: float = parameter(
         0.0,
@@ -40,7 +40,7 @@ class ImuEffects(Parameters):
     )
     mount_damping: float = parameter(0.1, gt=0.0, le=2.0, text="damping ratio of the mount")
     position: ThreeNumbers = parameter(
-        (0.0, 0.0, 0.0), unit="m", text="where the unit is beside its nominal place, base frame"
+        (0.0, 0.0, 0.0), unit="m", text="offset of the unit from its nominal place, base frame"
     )
     position_spread: float = parameter(0.0, unit="m", ge=0.0, text="spread of it, per axis")
     rotation: ThreeNumbers = parameter(
@@ -61,22 +61,22 @@ class ImuEffects(Parameters):
 
     @property
     def moved(self) -> bool:
-        """Whether the unit is not at its nominal place and angle."""
+        """True if the unit is not at its nominal place and angle."""
         return any((*self.position, *self.rotation, self.position_spread, self.rotation_spread))
 
     @property
     def filters(self) -> int:
-        """How many filters a reading passes."""
+        """The number of filters that a reading passes."""
         return (self.mount_frequency is not None) + (self.bandwidth is not None)
 
     @property
     def ideal(self) -> bool:
-        """Whether the reading is the motion of the base itself."""
+        """True if the reading is the motion of the base itself."""
         return self == ImuEffects()
 
 
 class EncoderEffects(Parameters):
-    """What is not ideal in the joint encoders, besides offset and resolution; by default nothing."""
+    """Imperfections of the joint encoders, besides offset and resolution; by default none."""
 
     delay: float = parameter(
         0.0, unit="s", ge=0.0, le=0.05, text="age of angle and velocity, in whole physics steps"
@@ -89,7 +89,7 @@ class EncoderEffects(Parameters):
         0.0, unit="rad", ge=0.0, text="amplitude of an error once a turn, with a drawn phase"
     )
     compliance: float = parameter(
-        0.0, unit="rad/(N m)", ge=0.0, text="by which the gear yields before the encoder"
+        0.0, unit="rad/(N m)", ge=0.0, text="compliance of the gear before the encoder"
     )
     backlash: float = parameter(
         0.0, ge=0.0,
@@ -98,7 +98,7 @@ class EncoderEffects(Parameters):
 
 
 class MotorEffects(Parameters):
-    """What is not ideal in the motors and their current loops; by default nothing."""
+    """Imperfections of the motors and their current loops; by default none."""
 
     torque_constant: float = parameter(
         1.0, gt=0.0, text="factor on the torque constants of all motors"
@@ -115,7 +115,7 @@ class MotorEffects(Parameters):
     )
     torque_limit: float | None = parameter(
         None, unit="N m", gt=0.0,
-        text="what a motor is limited to by its current, below its peak; none: its peak",
+        text="limit of a motor's torque by its current, below its peak; none: its peak",
     )  # fmt: skip
     ripple: float = parameter(
         0.0, ge=0.0, lt=0.5,
@@ -147,7 +147,7 @@ class GearParameters(Parameters):
 
 
 class LinkEffects(Parameters):
-    """How the links differ from the description, besides a common factor on all masses."""
+    """Differences of the links from the description, besides a common factor on all masses."""
 
     mass_spread: float = parameter(
         0.0, ge=0.0, lt=1.0, text="spread of the factor on the mass of every link"
@@ -166,7 +166,7 @@ class LinkEffects(Parameters):
 
 
 class JointEffects(Parameters):
-    """How joints and rotors differ from the description, besides the common factor ``joint_friction``."""
+    """Differences of joints and rotors from the description, besides the common factor ``joint_friction``."""
 
     friction_spread: float = parameter(
         0.0, ge=0.0, lt=1.0, text="spread of the factor on friction and damping of every joint"
@@ -192,7 +192,7 @@ class JointEffects(Parameters):
 
 
 class SoleParameters(Parameters):
-    """Rubber under the contact points: contacts as soft and as bouncing as these say."""
+    """Rubber under the contact points: contacts with this softness and bounce."""
 
     time_constant: float = parameter(
         0.008, unit="s", gt=0.0, le=0.1, text="in which a contact settles; stiff ones take 4 ms"
@@ -206,7 +206,7 @@ class CableParameters(Parameters):
     pull: float = parameter(
         ge=0.0, text="its horizontal force in a drawn direction, as a share of the robot's weight"
     )
-    weight: float = parameter(0.0, ge=0.0, text="what hangs of it on the robot, likewise")
+    weight: float = parameter(0.0, ge=0.0, text="weight of it that hangs on the robot, likewise")
 
 
 class GantryParameters(Parameters):
@@ -215,53 +215,60 @@ class GantryParameters(Parameters):
     height: float = parameter(0.04, unit="m", ge=0.0, le=1.0, text="of the soles above the ground")
     lower_after: float | None = parameter(
         0.5, unit="s", ge=0.0,
-        text="when it is let down, from the first command on; none: when somebody says so",
+        text="time at which it is let down, from the first command on; none: on a person's word",
     )  # fmt: skip
     speed: float | None = parameter(
         0.08, unit="m/s", gt=0.0, text="at which it is let down; none: it is dropped"
     )
     slack: float = parameter(
-        0.5, unit="m", ge=0.0, text="by which the rope is too long to pull once the robot stands"
+        0.5,
+        unit="m",
+        ge=0.0,
+        text="length of the rope beyond that at which it pulls, once the robot stands",
     )
     rope: float = parameter(1.0, unit="m", gt=0.0, text="length of the rope while the robot hangs")
     above_com: float = parameter(
-        0.15, unit="m", ge=0.0, text="where it is tied to the base: above the robot's CoM"
+        0.15, unit="m", ge=0.0, text="height of its fixing to the base above the robot's CoM"
     )
-    stretch: float = parameter(
-        0.005, unit="m", gt=0.0, text="by which the robot's weight makes it longer"
-    )
+    stretch: float = parameter(0.005, unit="m", gt=0.0, text="stretch by the robot's weight")
 
 
 class BatteryParameters(Parameters):
-    """A pack, or the supply of a bench; what is none is as ``supply`` in the robot's description says."""
+    """A pack, or the supply of a bench; what is none is as under ``supply`` in the robot's description."""
 
     open_voltage: float | None = parameter(
         None, unit="V", gt=0.0, text="without load, at the start"
     )
-    resistance: float | None = parameter(None, unit="ohm", ge=0.0, text="what a load sees at once")
+    resistance: float | None = parameter(
+        None, unit="ohm", ge=0.0, text="resistance that a load sees at once"
+    )
     recovery_resistance: float | None = parameter(
-        None, unit="ohm", ge=0.0, text="what builds up under load and recovers after it"
+        None,
+        unit="ohm",
+        ge=0.0,
+        text="resistance whose voltage builds up under load and recovers after it",
     )
     recovery_time: float = parameter(
         10.0, unit="s", gt=0.0, text="time constant of building up and recovering"
     )
     capacity: float | None = parameter(None, unit="A s", gt=0.0, text="charge of the full pack")
     fall: float | None = parameter(
-        None, unit="V", ge=0.0, text="by which the open voltage falls from full to empty"
+        None, unit="V", ge=0.0, text="fall of the open voltage from full to empty"
     )
     board_power: float | None = parameter(
-        None, unit="W", ge=0.0, text="what computer and boards draw"
+        None, unit="W", ge=0.0, text="power of computer and boards"
     )
 
     def of(self, robot: RobotDescription) -> PowerSupply:
-        """The supply of a robot whose description has one, with what is said here in place of its values."""
+        """Return the supply of a robot whose description has one, with these parameters in place of its values."""
         assert robot.supply is not None
         changes = self.model_dump(exclude_none=True, exclude={"recovery_time"})
         return robot.supply.model_copy(update=changes)
 
 
 class WindingParameters(Parameters):
-    """Windings that warm, and by what that weakens the motors; what is none is as ``supply`` in the robot's description says."""
+    """Windings that warm, and their effect on the motors; what is none is as under ``supply`` in the robot's
+    description."""
 
     temperature: float = parameter(
         25.0, ge=-40.0, le=150.0, text="of all windings at the start [deg C]"
@@ -287,7 +294,8 @@ class WindingParameters(Parameters):
     )
 
     def of(self, robot: RobotDescription) -> PowerSupply:
-        """The supply of a robot whose description has one, with what is said here in place of its windings' values."""
+        """Return the supply of a robot whose description has one, with these parameters in place of its windings'
+        values."""
         assert robot.supply is not None
         given = {"heat_capacity": self.heat_capacity, "thermal_resistance": self.thermal_resistance}
         changes = {f"winding_{name}": value for name, value in given.items() if value is not None}
@@ -295,7 +303,7 @@ class WindingParameters(Parameters):
 
 
 class SwitchEffects(Parameters):
-    """What delays the foot switches, and how hard they are to press; by default nothing."""
+    """Delay and force threshold of the foot switches; by default none."""
 
     threshold: TwoNumbers | None = parameter(
         None,
@@ -304,7 +312,7 @@ class SwitchEffects(Parameters):
     )  # fmt: skip
     debounce: float = parameter(
         0.0, unit="s", ge=0.0, le=0.1,
-        text="for how long a switch must be pressed or free before the board says so",
+        text="time for which a switch must be pressed or free before the board reports it",
     )  # fmt: skip
     sticking: float = parameter(
         0.0, unit="s", ge=0.0, le=0.1, text="for how long a switch stays closed that is free again"
@@ -312,8 +320,8 @@ class SwitchEffects(Parameters):
 
 
 def longest_gear_step(params: GearParameters, inertia: Array) -> float:
-    """The longest step [s] at which rotors of this ``inertia`` [kg m^2] against their gears' output stages
-    are integrated well: a tenth of the shortest period."""
+    """Return the longest step [s] at which rotors of this ``inertia`` [kg m^2] against their gears' output stages are
+    integrated well: a tenth of the shortest period."""
     least = float(inertia[inertia > 0.0].min())
     share = params.output_share
     fastest = math.sqrt(params.stiffness / (least * share * (1.0 - share)))
@@ -321,7 +329,7 @@ def longest_gear_step(params: GearParameters, inertia: Array) -> float:
 
 
 def longest_stribeck_step(joints: JointEffects, friction: Array, inertia: Array) -> float:
-    """The longest step [s] at which static friction that falls with speed is followed: a fifth of the time in
+    """Return the longest step [s] at which static friction that falls with speed is followed: a fifth of the time in
     which it would let the speed of a bare rotor grow by e.
 
     Args:

@@ -28,17 +28,17 @@ if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
 PAID_OUT, GOAL, DUE, DISTANCE = range(4)
-"""Elements of ``PhysicsState.gantry``: by how much the rope is longer than at the start, and is going to be
-[m]; the physics step in which it is let down, negative: not yet; the distance of its ends [m]."""
+"""Elements of ``PhysicsState.gantry``: the length of the rope beyond that at the start, and its goal [m]; the physics
+step in which it is let down, negative: not yet; the distance of its ends [m]."""
 NOT_DUE = -1e15
 DAMPING_RATIO = 0.5
 """Of the robot's bouncing on its rope."""
 
 
 class Rope(NamedTuple):
-    """The rope: its ``anchor`` (3,) [m, world] and where it is tied to the base, ``tied`` (3,) [m, base
-    frame]; length [m], stiffness [N/m], damping [N s/m]; how fast it is paid out [m/s]; by how much [m]
-    until the robot stands, and then at once; step [s]."""
+    """The rope: its ``anchor`` (3,) [m, world] and its fixing to the base, ``tied`` (3,) [m, base frame]; length [m],
+    stiffness [N/m], damping [N s/m]; the speed of paying out [m/s]; the length paid out [m] until the robot stands, and
+    then at once; step [s]."""
 
     anchor: Vector3
     tied: Vector3
@@ -153,5 +153,5 @@ class Gantry:
         self._memory.gantry[GOAL], self._memory.gantry[DUE] = 0.0, NOT_DUE
 
     def pulling(self, step: Counts) -> KernelCall:
-        """The rope pulls in the physics ``step``."""
+        """Return the call in which the rope pulls in the physics ``step``."""
         return signal_call(pull_rope, step, self._rope, self._base, self._memory)

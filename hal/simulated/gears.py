@@ -85,7 +85,7 @@ def turn_gears(
 def sense_rotors(
     train: GearTrain, memory: PhysicsState, position: Array1D, velocity: Array1D
 ) -> None:
-    """What joint angles and velocities the rotors' encoders stand for [rad, rad/s]."""
+    """Compute the joint angles and velocities that the rotors' encoders stand for [rad, rad/s]."""
     multiply_vector(train.motion_to_joint, memory.rotor_angle, position)
     multiply_vector(train.motion_to_joint, memory.rotor_speed, velocity)
 
@@ -120,12 +120,12 @@ class YieldingGears:
         self.position, self.velocity = np.zeros(n), np.zeros(n)
 
     def begin(self, position: Array) -> None:
-        """The rotors rest where the joints are [rad]."""
+        """Put the rotors where the joints are [rad], at rest."""
         self._memory.rotor_angle[:] = self._train.to_motor @ position
         self._memory.rotor_speed[:] = 0.0
 
     def turning(self, position: Array, velocity: Array, torque: Array) -> KernelCall:
-        """Turns the rotors in a physics step; arguments as for ``turn_gears``."""
+        """Return the call that turns the rotors in a physics step; arguments as for ``turn_gears``."""
         scratch = GearScratch(*(np.zeros(len(self.position)) for _ in GearScratch._fields))
         return signal_call(
             turn_gears, position, velocity, self._train, scratch, self._memory, torque

@@ -1,6 +1,6 @@
-"""What lies between the motion of a robot's base and the readings of its IMU: place, mount, filter, delay.
+"""The path from the motion of a robot's base to the readings of its IMU: place, mount, filter, delay.
 
-The unit sits where the description says it does up to an error of place and angle, on a mount that may
+The unit sits at the description's place up to an error of place and angle, on a mount that may
 ring. Its axes have scale errors, its gyroscope answers to acceleration a little, its own filter lets
 nothing fast pass, and what it has measured arrives late. Noise, bias and range are added to what it
 then reads (``sensors.py``). Everything is computed at the rate of the physics.
@@ -29,36 +29,36 @@ _AXES = 6
 """The axes of the gyroscope and of the accelerometer."""
 
 
-class ImuPlace(NamedTuple):
-    """Where the unit is: its ``place`` [m, base frame], and the rotation vector ``to_axes`` [rad] from the
+class ImuPose(NamedTuple):
+    """Pose of the unit: its ``position`` [m, base frame], and the rotation vector ``to_axes`` [rad] from the
     base's axes to its own."""
 
-    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
     to_axes: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
     def quaternion(self) -> Array:
-        """From the unit's axes to the base's: x, y, z, w."""
+        """The rotation from the unit's axes to the base's: x, y, z, w."""
         out = np.empty(4)
         exponential(np.array(self.to_axes), out)
         return out
 
 
-NOMINAL = ImuPlace()
-"""At the base's origin, with the base's axes."""
+NOMINAL = ImuPose()
+"""The base's origin, with the base's axes."""
 
 
-def draw_place(effects: ImuEffects, seed: int) -> ImuPlace:
-    """Where the unit is, by the seed."""
+def draw_imu_pose(effects: ImuEffects, seed: int) -> ImuPose:
+    """Draw the pose of the unit, by the seed."""
     place = draw_spread(effects.position, effects.position_spread, seed, Purpose.IMU_POSITION)
     angle = draw_spread(effects.rotation, effects.rotation_spread, seed, Purpose.IMU_ROTATION)
-    return ImuPlace((place[0], place[1], place[2]), (angle[0], angle[1], angle[2]))
+    return ImuPose((place[0], place[1], place[2]), (angle[0], angle[1], angle[2]))
 
 
 def draw_spread(
     nominal: tuple[float, ...], spread: float, seed: int, purpose: Purpose
 ) -> tuple[float, ...]:
-    """The ``nominal`` numbers, each with a draw of up to the ``spread`` to either side."""
+    """Return the ``nominal`` numbers, each with a draw of up to the ``spread`` to either side."""
     draws = stream(seed, purpose).uniform(-1.0, 1.0, len(nominal))
     return tuple(float(a + spread * b) for a, b in zip(nominal, draws, strict=True))
 
@@ -144,14 +144,14 @@ class ImuModel:
                 row += 1
         self.delays = draw_delays(effects, seed)
         self._chain = ImuChain(
-            draw_place(effects, seed).quaternion, 1.0 + scale,
+            draw_imu_pose(effects, seed).quaternion, 1.0 + scale,
             effects.acceleration_sensitivity * sensitivity, filters,
             np.repeat([round(delay / timestep) for delay in self.delays], 3),
         )  # fmt: skip
 
     @staticmethod
     def dimensions(effects: ImuEffects, timestep: float) -> Mapping[str, int]:
-        """The sizes of what is kept in ``PhysicsState``."""
+        """Return the sizes of what is kept in ``PhysicsState``."""
         longest = max(effects.gyro_delay, effects.accelerometer_delay) + effects.delay_spread
         return {
             "n_imu_filters": _AXES * effects.filters,
@@ -160,17 +160,17 @@ class ImuModel:
         }
 
     def sensing(self, rate: Array, force: Array) -> KernelCall:
-        """Reads the unit after a physics step; arguments as for ``pass_imu``."""
+        """Return the call that reads the unit after a physics step; arguments as for ``pass_imu``."""
         scratch = ImuScratch(np.zeros(3), np.zeros(_AXES))
         return signal_call(pass_imu, rate, force, self._chain, scratch, self._memory)
 
     def metrics(self) -> Mapping[str, float]:
-        """What was drawn."""
+        """Return the drawn values."""
         gyroscope, accelerometer = (1e3 * delay for delay in self.delays)
         return {"robot_gyro_delay_ms": gyroscope, "robot_accelerometer_delay_ms": accelerometer}
 
 
 def draw_delays(effects: ImuEffects, seed: int) -> tuple[float, float]:
-    """The delays of gyroscope and accelerometer [s], by the seed."""
+    """Return the delays of gyroscope and accelerometer [s], by the seed."""
     more = effects.delay_spread * float(stream(seed, Purpose.IMU_DELAY).uniform(-1.0, 1.0))
     return max(0.0, effects.gyro_delay + more), max(0.0, effects.accelerometer_delay + more)

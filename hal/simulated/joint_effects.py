@@ -43,7 +43,7 @@ def set_friction(velocity: Array1D, friction: StribeckFriction, loss: Array1D) -
 def falling_friction(
     velocity: Array, loss: Array, static: tuple[float, ...], stribeck_velocity: float
 ) -> KernelCall:
-    """The call that brings the friction losses up to date before a physics step.
+    """Return the call that brings the friction losses up to date before a physics step.
 
     Args:
         velocity: of the joints [rad/s], (n_joints,), a view of the simulator's memory.

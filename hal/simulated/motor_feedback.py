@@ -29,20 +29,20 @@ from ..drive_control import (
 )
 
 _LEAD = 1.5
-"""From a measurement to the middle of the time in which the goals made from it act, in periods."""
+"""Time from a measurement to the middle of that in which the goals made from it act, in periods."""
 
 
 class FeedbackState(MotorGoals):
     """The goals of the drives, and the measurement that the next ones are made from."""
 
-    following = Field(dtype="bool", text="whether a command has arrived")
+    following = Field(dtype="bool", text="a command has arrived")
     age = Field(dtype="int64", text="physics steps since the goals were made")
     seen_position = Field("n_joints", unit="rad", text="joint angles in the exchange before")
     seen_velocity = Field("n_joints", unit="rad/s", text="joint velocities in it")
 
 
 class LoopScratch(GoalScratch):
-    """What the loops of all drives compute in a physics step."""
+    """Intermediate values of the loops of all drives in a physics step."""
 
     angle = Field("n_joints", unit="rad", text="of the motors")
     speed = Field("n_joints", unit="rad/s", text="of the motors")
@@ -107,7 +107,7 @@ def close_loops(
     velocity: Array1D,
     out: Array1D,
 ) -> bool:
-    """Write the joint torques [N m] of a physics step; says whether a command has arrived at all.
+    """Write the joint torques [N m] of a physics step; return whether a command has arrived at all.
 
     Args:
         commands, row: the active command.

@@ -282,7 +282,7 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
     add_link(robot.base, spec.worldbody, (0.0, 0.0, 0.0))
     BASES[robot.base_joint].add_joints(bodies[robot.base])
     x, y, z, w = variation.imu.quaternion.tolist()
-    bodies[robot.base].add_site(name="imu", pos=variation.imu.place, quat=[w, x, y, z])
+    bodies[robot.base].add_site(name="imu", pos=variation.imu.position, quat=[w, x, y, z])
     armature, motors = joint_armature(robot, variation), robot.motors
     hinge, slide = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
     yes, no = mujoco.mjtLimited.mjLIMITED_TRUE, mujoco.mjtLimited.mjLIMITED_FALSE

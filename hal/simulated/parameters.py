@@ -122,7 +122,7 @@ class GroundParameters(Parameters):
         if self.scene == "platform":
             return scenes.platform(self.platform_height, self.platform_edge)
         if self.scene == "none":
-            return scenes.nowhere()
+            return scenes.no_ground()
         return scenes.flat()
 
 

@@ -7,13 +7,13 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...mathematics.compiling.library_call import LibraryCall, address_of
+from ...mathematics.compiling.foreign_call import ForeignCall, address_of
 
 if TYPE_CHECKING:
     from mujoco import MjData, MjModel
 
 
-def step_calls(model: MjModel, data: MjData) -> tuple[LibraryCall, LibraryCall]:
+def step_calls(model: MjModel, data: MjData) -> tuple[ForeignCall, ForeignCall]:
     """The two parts of a physics step: what follows from the state, and the step with the present controls. ``model``
     and ``data`` must stay alive.
 
@@ -26,8 +26,8 @@ def step_calls(model: MjModel, data: MjData) -> tuple[LibraryCall, LibraryCall]:
     first, second = _addresses()
     memory = model._address, data._address
     return (
-        LibraryCall(partial(mujoco.mj_step1, model, data), first, *memory),
-        LibraryCall(partial(mujoco.mj_step2, model, data), second, *memory),
+        ForeignCall(partial(mujoco.mj_step1, model, data), first, *memory),
+        ForeignCall(partial(mujoco.mj_step2, model, data), second, *memory),
     )
 
 

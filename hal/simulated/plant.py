@@ -20,8 +20,8 @@ from ...mathematics.arrays import (
     Indices,
 )
 from ...mathematics.compiling.call_sequence import Call, CallSequence
+from ...mathematics.compiling.foreign_call import ForeignCall
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.compiling.library_call import LibraryCall
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
 from ...runtime.language.steps import signal_call
@@ -237,7 +237,7 @@ class Plant:
         )
         self.step1, self.step2 = step_calls(model, data)
         if self._params.ground.contact_bias:
-            self.step1 = LibraryCall(ContactBias(model, data).begin_step, 0)
+            self.step1 = ForeignCall(ContactBias(model, data).begin_step, 0)
         self._falling: list[Call] = []
         if self.variation.static_friction:
             self._falling.append(falling_friction(

@@ -19,16 +19,16 @@ from ...runtime.language.signals import Field, Signal
 class PushState(Signal):
     """The progress of a push."""
 
-    stood = Field(dtype="bool", text="whether the robot has touched the ground")
+    stood = Field(dtype="bool", text="the robot has touched the ground")
     waiting = Field(dtype="int64", text="ticks since the trigger")
     flights = Field(dtype="int64", text="flights so far that lasted as long as the delay")
-    counted = Field(dtype="bool", text="whether the present flight is among them")
-    pushed = Field(unit="s", text="how long the push has lasted so far")
+    counted = Field(dtype="bool", text="the present flight is among them")
+    pushed = Field(unit="s", text="duration of the push so far")
 
 
 @kernel
 def ticks_since_trigger(at_start: bool, truth: RobotTruth, progress: PushState) -> int:
-    """The ticks since the trigger, up to now; negative before the trigger."""
+    """Count the ticks since the trigger, up to now; negative before the trigger."""
     if at_start:
         progress.waiting = progress.waiting + 1
         return int(progress.waiting - 1)
@@ -57,7 +57,7 @@ class Push(Block):
     push changes the speed of the robot's centre of mass by that much; so robots of any mass can be
     given the same push.
 
-    The paper's test is 70 N for 0.01 s, 0.03 s after lift-off; it does not say where. The default
+    The paper's test is 70 N for 0.01 s, 0.03 s after lift-off; it does not give the point. The default
     is the torso's centre of mass, 0.12 m above the whole robot's, so the push also turns it.
     """
 
@@ -68,9 +68,9 @@ class Push(Block):
         )
         angle: float = live_parameter(0.0, unit="rad", text="direction, from forward to the left")
         elevation: float = live_parameter(0.0, unit="rad", text="direction, above the horizontal")
-        duration: float = live_parameter(0.01, unit="s", gt=0, text="how long it lasts")
+        duration: float = live_parameter(0.01, unit="s", gt=0, text="its duration")
         trigger: Literal["lift_off", "start"] = parameter(
-            "lift_off", text="what the delay is counted from"
+            "lift_off", text="event from which the delay is counted"
         )
         flight: int = parameter(1, ge=1, text="in which flight, counted from 1, after a lift-off")
         delay: float = live_parameter(0.03, unit="s", ge=0, text="from the trigger to the push")
@@ -83,7 +83,7 @@ class Push(Block):
     needs = ("robot",)
     params: Params
     constants: Constants
-    truth = Input(RobotTruth, reads_truth=True, text="whether the robot is in the air")
+    truth = Input(RobotTruth, reads_truth=True, text="true state: the robot is in the air")
     push = Output(ExternalForce, text="the force; it is zero except during the push")
     progress = State(PushState, text="the progress of the push")
 

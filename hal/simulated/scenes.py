@@ -18,39 +18,39 @@ from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.terrain import Ground, HeightField, Terrain
 from .tiles import TileParameters
 
-Span = tuple[float, float]
+Interval = tuple[float, float]
 
 MAX_CORNERS = 400
 """The most rows or columns of a height field."""
 CORNERS_OF_A_WAVE = 12
-"""How many corners of a height field a wave has along its length."""
+"""Number of corners of a height field along a wave's length."""
 
 
 def flat() -> Terrain:
-    """A level floor."""
+    """Return a level floor."""
     return Terrain()
 
 
-def nowhere() -> Terrain:
+def no_ground() -> Terrain:
     """No ground: the floor is a kilometre below, out of reach of a robot on a fixed base."""
     return Terrain(floor=-1000.0)
 
 
 def step(height: float, distance: float, depth: float = 1.5) -> Terrain:
-    """A step of ``height`` [m] whose front edge is ``distance`` [m] ahead of the origin, and whose
-    back edge is ``depth`` [m] further ahead."""
+    """Return a step of ``height`` [m] whose front edge is ``distance`` [m] ahead of the origin, and whose back edge is
+    ``depth`` [m] further ahead."""
     return Terrain(blocks=(Ground((distance, -0.75, 0.0), (distance + depth, 0.75, height)),))
 
 
 def platform(height: float, edge: float) -> Terrain:
-    """A platform that the robot starts on, ``height`` [m] above the floor. Its edge is ``edge`` [m]
-    ahead of the origin, or behind it if that is negative."""
+    """Return a platform that the robot starts on, ``height`` [m] above the floor. Its edge is ``edge`` [m] ahead of the
+    origin, or behind it if that is negative."""
     back, front = (edge - 0.6, edge) if edge >= 0.0 else (edge, edge + 0.6)
     return Terrain(-height, (Ground((back, -0.4, -height), (front, 0.4, 0.0)),))
 
 
 class PieceParameters(Parameters):
-    """What a piece of ground is made of."""
+    """Material of a piece of ground."""
 
     friction: float | None = parameter(
         None, gt=0, text="its friction coefficient; none: that of the scene"
@@ -63,11 +63,11 @@ class PieceParameters(Parameters):
 class BoxParameters(PieceParameters):
     """A box, as a graph describes it."""
 
-    x: Span = parameter(text="from, to; ahead of where the robot starts", unit="m")
-    y: Span = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
+    x: Interval = parameter(text="from, to; ahead of where the robot starts", unit="m")
+    y: Interval = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
     top: float = parameter(text="height of the middle of its upper face", unit="m")
     bottom: float = parameter(0.0, unit="m", text="height of its lower face")
-    slope: Span = parameter(
+    slope: Interval = parameter(
         (0.0, 0.0), unit="rad", text="angles by which its upper face rises ahead and to the left"
     )
 
@@ -80,7 +80,7 @@ class BoxParameters(PieceParameters):
         return self
 
     def build(self) -> Ground:
-        """The box."""
+        """Return the box."""
         return Ground(
             (self.x[0], self.y[0], self.bottom), (self.x[1], self.y[1], self.top),
             self.slope, self.friction, self.stiffness,
@@ -91,14 +91,14 @@ class StairParameters(PieceParameters):
     """Stairs that lead ahead, up or down."""
 
     x: float = parameter(text="the first edge; ahead of where the robot starts", unit="m")
-    y: Span = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
+    y: Interval = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
     rise: float = parameter(text="height of each step; negative: they lead down", unit="m")
     run: float = parameter(text="depth of each step", unit="m", gt=0)
-    steps: int = parameter(text="how many there are", ge=1, le=100)
+    steps: int = parameter(text="number of steps", ge=1, le=100)
     landing: float = parameter(1.0, unit="m", gt=0, text="depth of the last step")
 
     def build(self, floor: float) -> tuple[Ground, ...]:
-        """A box for each step that is above the floor."""
+        """Return a box for each step that is above the floor."""
         found = []
         for k in range(self.steps):
             start, top = self.x + k * self.run, (k + 1) * self.rise
@@ -112,8 +112,8 @@ class StairParameters(PieceParameters):
 class FieldParameters(PieceParameters):
     """A height field: heights over a grid, with straight edges between neighbours."""
 
-    x: Span = parameter(text="from, to; ahead of where the robot starts", unit="m")
-    y: Span = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
+    x: Interval = parameter(text="from, to; ahead of where the robot starts", unit="m")
+    y: Interval = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
     top: float = parameter(0.0, unit="m", text="added to all heights")
     heights: list[list[float]] | None = parameter(
         None, unit="m", text="rows from right to left, each with heights from behind to ahead"
@@ -128,7 +128,7 @@ class FieldParameters(PieceParameters):
     waves: float | None = parameter(
         None, unit="m", gt=0, text="length of waves between 0 and `height`"
     )
-    heading: float = parameter(0.0, unit="rad", text="where the waves go, 0: ahead")
+    heading: float = parameter(0.0, unit="rad", text="direction of the waves, 0: ahead")
     height: float = parameter(0.02, unit="m", gt=0, text="of rubble, waves or white")
     seed: int = parameter(0, ge=0, text="of the rubble")
 
@@ -154,7 +154,7 @@ class FieldParameters(PieceParameters):
         return self
 
     def build(self) -> HeightField:
-        """The field."""
+        """Return the field."""
         heights = tuple(tuple(round(self.top + z, 6) for z in row) for row in self._heights())
         (x0, x1), (y0, y1) = self.x, self.y
         return HeightField((x0, y0), (x1, y1), heights, self.friction, self.stiffness)
@@ -183,7 +183,7 @@ class FieldParameters(PieceParameters):
 
 
 def read_picture(file: Path, height: float) -> list[list[float]]:
-    """The heights [m] of a picture's pixels: rows from its lowest, black is 0, white is ``height``.
+    """Return the heights [m] of a picture's pixels: rows from its lowest, black is 0, white is ``height``.
 
     Raises:
         ValueError: there is no such picture, or it cannot be read.
@@ -221,8 +221,7 @@ class SceneParameters(Parameters):
     tiles: tuple[TileParameters, ...] = parameter((), text="areas of drawn tiles")
     uneven: float | None = parameter(
         None, unit="m", ge=0,
-        text="how far it is from what the task says, for the score; none: as far as leaning boxes, "
-        "tiles and fields rise or sink",
+        text="largest distance from the ground of the task, for the score; none: as far as leaning boxes, tiles and fields rise or sink",
     )  # fmt: skip
 
     @model_validator(mode="after")
@@ -237,7 +236,7 @@ class SceneParameters(Parameters):
         return self
 
     def build(self, seed: int = 0) -> Terrain:
-        """The ground these parameters describe; tiles without a seed of their own are drawn by ``seed``."""
+        """Build the ground these parameters describe; tiles without a seed of their own are drawn by ``seed``."""
         blocks = [box.build() for box in self.boxes]
         fields = tuple(field.build() for field in self.fields)
         uneven = max((block.rise for block in blocks), default=0.0)

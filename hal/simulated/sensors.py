@@ -14,7 +14,7 @@ from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from ...robots.robot_description import MountedSensorPart
+from ...robots.robot_description import SensorMount
 from ...runtime.language.signals import Signal
 from ..random_streams import Purpose, RandomStreams, sensor_stream, stream
 from ..sensors.built_in import JointSensors, SwitchSensors
@@ -152,7 +152,7 @@ class SimulatedSensors:
         n, seed = len(robot.joints), params.seed
         self._robot, self._params, self._streams = robot, params, streams
         self._has_imu, self._has_switches = robot.sensors.imu, robot.sensors.switches
-        self._imu = Imu("imu", MountedSensorPart(kind="imu", link=robot.base))
+        self._imu = Imu("imu", SensorMount(kind="imu", link=robot.base))
         errors = params.sensors
         gyroscope = NoiseModel(
             noise=errors.gyro_noise, bias=errors.gyro_bias, range=errors.gyro_range

@@ -1,5 +1,5 @@
-"""How a simulated robot is made to stand before a run: its pose, the torques and gains that hold it,
-and the check that it does stand as its description says.
+"""The standing start of a simulated robot before a run: its pose, the torques and gains that hold it, and the check
+that it stands as described.
 
 The linear algebra here is MuJoCo's own, because NumPy's rounds differently from one CPU to the
 next, and then runs of the same seed would differ from their first tick on.
@@ -40,7 +40,7 @@ _DAMPING = 1e-8
 
 
 class StartError(BlockError):
-    """A simulated robot cannot start a run as its description says it stands."""
+    """A simulated robot cannot start a run as it stands by its description."""
 
 
 def place_standing(
@@ -154,8 +154,8 @@ def _lean_ground(
 def holding_torque(
     model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription, hangs: bool = False
 ) -> Array:
-    """The joint torques [N m] (n_joints,) that hold the robot still in its present pose, with the
-    smallest contact forces that carry its weight, or with none where it ``hangs`` by its base."""
+    """Return the joint torques [N m] (n_joints,) that hold the robot still in its present pose, with the smallest
+    contact forces that carry its weight, or with none where it ``hangs`` by its base."""
     import mujoco
 
     mujoco.mj_forward(model, data)
@@ -181,7 +181,7 @@ def holding_torque(
 
 
 def standing_torques(robot: RobotDescription, model: MjModel) -> Array:
-    """The motor torques [N m] (n_motors,) that hold a robot with feet still as it stands.
+    """Return the motor torques [N m] (n_motors,) that hold a robot with feet still as it stands.
 
     Raises:
         StartError: it cannot be put on the ground.
@@ -195,8 +195,8 @@ def standing_torques(robot: RobotDescription, model: MjModel) -> Array:
 
 
 def joint_inertias(robot: RobotDescription, model: MjModel) -> Array:
-    """The inertia [kg m^2, kg] (n_joints,) that every joint turns as the robot stands, rotors included,
-    while its base and all other joints are still."""
+    """Return the inertia [kg m^2, kg] (n_joints,) that every joint turns as the robot stands, rotors included, while
+    its base and all other joints are still."""
     import mujoco
 
     data = mujoco.MjData(model)
@@ -219,7 +219,7 @@ def centre_on_origin(data: MjData, base: FixedBase, robot: RobotDescription) -> 
 
 
 def depth_of_contacts(robot: RobotDescription) -> Array:
-    """How far every contact point is below its site in the simulator's model [m], (n_contacts,).
+    """Return the depth of every contact point below its site in the simulator's model [m], (n_contacts,).
 
     For a foot that is one ball this is the ball's radius, because the site is at the ball's centre;
     for all other points it is zero.
@@ -231,7 +231,7 @@ def depth_of_contacts(robot: RobotDescription) -> Array:
 
 
 def _leg_joints(robot: RobotDescription) -> NDArray[np.int64]:
-    """The indices of the joints that move a foot."""
+    """Return the indices of the joints that move a foot."""
     legs = np.zeros(len(robot.joints), dtype=np.bool_)
     for foot in robot.feet:
         legs |= np.array(joints_above(robot, foot.link), np.bool_)
@@ -260,7 +260,7 @@ def _put_down(model: MjModel, data: MjData, base: FixedBase, robot: RobotDescrip
 
 
 def _solve_normal(matrix: Array, right: Array) -> Array:
-    """The least-squares solution of an overdetermined system, damped where it is singular."""
+    """Return the least-squares solution of an overdetermined system, damped where it is singular."""
     import mujoco
 
     size = matrix.shape[1]
@@ -284,7 +284,7 @@ def _solve_positive(square: Array, right: Array, solution: Array) -> None:
 
 
 def _soles(data: MjData, robot: RobotDescription) -> list[Array]:
-    """Where each foot's sole is; of a foot that is one ball, its centre."""
+    """Return the place of each foot's sole; of a foot that is one ball, its centre."""
     import mujoco
 
     from .mujoco_model import body_name  # not for a check
@@ -323,7 +323,7 @@ NEAR = 0.001
 
 
 MOST_NAMED = 3
-"""How many joints, links or contact points of a kind an error names."""
+"""Largest number of joints, links or contact points of a kind that an error names."""
 
 
 class StartCheck:
@@ -483,7 +483,7 @@ class StartCheck:
 
 
 def _some(found: list[str]) -> list[str]:
-    """The first few texts, and the number of the others."""
+    """Return the first few texts, and the number of the others."""
     more = len(found) - MOST_NAMED
     return found if more <= 0 else [*found[:MOST_NAMED], f"the same of {more} more"]
 
@@ -500,16 +500,16 @@ RELEASED = 1.0 / 3.0
 
 
 def holding_gains(model: MjModel, robot: RobotDescription, lag: float = 0.0) -> tuple[Array, Array]:
-    """The stiffness [N m/rad] and damping [N m s/rad] that hold every joint before the first command,
-    each (n_joints,).
+    """Return the stiffness [N m/rad] and damping [N m s/rad] that hold every joint before the first command, each
+    (n_joints,).
 
     They follow from the robot, so that a robot of 2 kg and one of 100 kg are held alike:
 
     * A joint of a leg carries the robot, which would topple about it like an inverted pendulum of
       gravity stiffness ``m g h``, with the mass ``m`` and the height ``h`` of the centre of mass above
       the ground. It is held 18 times as stiffly, with 5 ms of that stiffness as damping.
-    * Any other joint is held at a natural frequency of 60 rad/s, critically damped, for the inertia
-      that the mass matrix says it has in the standing pose.
+    * Any other joint is held at a natural frequency of 60 rad/s, critically damped, for its inertia
+      by the mass matrix in the standing pose.
 
     Both gains are bounded so that the drive's loop is stable. It is closed once in every physics step
     of ``dt`` on the inertia ``I`` of the joint with all others free, so the stiffness is at most
@@ -545,11 +545,11 @@ def holding_gains(model: MjModel, robot: RobotDescription, lag: float = 0.0) -> 
 
 
 def passive_joints(robot: RobotDescription) -> NDArray[np.int64]:
-    """The joints that no motor can move: all motors geared to them have a peak torque of zero."""
+    """Return the joints that no motor can move: all motors geared to them have a peak torque of zero."""
     driven = (robot.joint_to_motor[robot.motors.peak_torque > 0.0] != 0.0).any(axis=0)
     return np.flatnonzero(~driven)
 
 
 def _two_digits(value: float) -> float:
-    """The value rounded to two significant digits, so that it is the same on every machine."""
+    """Return the value rounded to two significant digits, so that it is the same on every machine."""
     return float(f"{value:.1e}") if math.isfinite(value) else value

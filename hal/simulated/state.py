@@ -32,14 +32,16 @@ class PhysicsState(Signal):
     random = Field("n_random", dtype="int64", text="the state of the random streams")
     imu_filters = Field(("n_imu_filters", 2), text="memory of the IMU's filters")
     imu_samples = Field(("n_imu_slots", "n_imu_axes"), text="past samples: rate and force")
-    imu_taken = Field(1, dtype="int64", text="how many samples the IMU has taken")
-    imu_reading = Field("n_imu_axes", text="what it reads: rate and force")
+    imu_taken = Field(1, dtype="int64", text="number of samples the IMU has taken")
+    imu_reading = Field("n_imu_axes", text="readings of the IMU: rate and force")
     encoder_samples = Field(("n_encoder_slots", "n_sensed_joints"), text="past joint angles")
     speed_samples = Field(("n_encoder_slots", "n_sensed_joints"), text="past joint velocities")
-    encoder_play = Field("n_sensed_joints", unit="rad", text="where rotors are within their play")
-    encoder_taken = Field(1, dtype="int64", text="how many samples the encoders have taken")
-    encoder_position = Field("n_sensed_joints", unit="rad", text="what the encoders read")
-    encoder_velocity = Field("n_sensed_joints", unit="rad/s", text="what they make of it")
+    encoder_play = Field(
+        "n_sensed_joints", unit="rad", text="places of the rotors within their play"
+    )
+    encoder_taken = Field(1, dtype="int64", text="number of samples the encoders have taken")
+    encoder_position = Field("n_sensed_joints", unit="rad", text="readings of the encoders")
+    encoder_velocity = Field("n_sensed_joints", unit="rad/s", text="joint rates made of them")
     motor_torque = Field("n_real_motors", unit="N m", text="behind the drives' current loops")
     rotor_angle = Field("n_rotors", unit="rad", text="of rotors behind gears that yield")
     rotor_speed = Field("n_rotors", unit="rad/s", text="of them")
@@ -86,7 +88,7 @@ class TickRecord(Signal):
 
 
 class SensorMemory(Signal):
-    """What the sensors that the description mounts keep from tick to tick."""
+    """Memory of the sensors that the description mounts, from tick to tick."""
 
     total = Field("n_sensed", text="sums over the physics steps since the last sample")
     steps = Field("n_mounted", dtype="int64", text="physics steps since the last sample")
@@ -95,7 +97,7 @@ class SensorMemory(Signal):
 
 
 def integration_elements(model: MjModel) -> list[StateElements]:
-    """The parts of MuJoCo's integration state, in their order."""
+    """Return the parts of MuJoCo's integration state, in their order."""
     import mujoco
 
     kinds = mujoco.mjtJoint
@@ -133,7 +135,7 @@ def integration_elements(model: MjModel) -> list[StateElements]:
 
 
 class StepSensors(NamedTuple):
-    """What the simulator knows after a physics step.
+    """True values of the simulator after a physics step.
 
     ``load`` (n_contacts, 4) are the contact counts of the contact points and the forces on the ground
     [N], ``soles`` (n_soles,) all contacts of soles with uneven ground, ``accelerometer`` (3,) is the specific force [m/s^2, body], ``contacts`` (1,) the number of all
@@ -166,13 +168,13 @@ def clear(record: TickRecord) -> None:
 
 @kernel
 def mean_over_steps(total: Array1D, steps: Indices0D, mean: Array1D) -> None:
-    """The ``mean`` (n,) of what has been summed up over ``steps``, a count without a dimension."""
+    """Compute the ``mean`` (n,) of what has been summed up over ``steps``, a count without a dimension."""
     mean[:] = total / steps[()]
 
 
 @kernel
 def read_encoders(position: Array1D, offset: Array1D, reading: Array1D) -> None:
-    """What the drives' own encoders read [rad] of the joints' positions, each (n_joints,)."""
+    """Read the drives' own encoders [rad] from the joints' positions, each (n_joints,)."""
     reading[:] = position + offset
 
 

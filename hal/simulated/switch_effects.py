@@ -1,4 +1,4 @@
-"""What lies between the force on a foot's switch and its reading, besides threshold and bounce."""
+"""The path from the force on a foot's switch to its reading, besides threshold and bounce."""
 
 from __future__ import annotations
 
@@ -51,5 +51,5 @@ class SwitchDelays:
         self._memory.switch_waits[:] = 0
 
     def settling(self, pressed: Flags) -> KernelCall:
-        """Updates ``closed`` after a physics step."""
+        """Return the call that updates ``closed`` after a physics step."""
         return signal_call(settle_switches, pressed, self._debounce, self._sticking, self._memory)

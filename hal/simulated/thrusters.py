@@ -78,7 +78,7 @@ class SimulatedThrusters:
         self._commands, self._queue = commands, queue
 
     def sending(self, command: ThrustCommand) -> KernelCall:
-        """Sends a command with the joint command that was sent before."""
+        """Return the call that sends a command with the joint command that was sent before."""
         return signal_call(send_thrust, command, self._commands, self._queue)
 
     def following(self) -> KernelCall:
@@ -88,7 +88,8 @@ class SimulatedThrusters:
         return signal_call(give_thrust, self._commands, self._queue, most, thrust)
 
     def reading(self, state: ThrusterState) -> KernelCall:
-        """Publishes the present thrust, as rotor speeds would tell it: without the factors that the seed draws."""
+        """Return the call that publishes the present thrust, as from rotor speeds: without the factors that the seed
+        draws."""
         first = len(self._robot.joints)
         place = np.array(self._model.actuator_actadr[first:], np.int64)
         return signal_call(read_thrust, self._data.ctrl[first:], self._data.act, place, state)
@@ -120,7 +121,7 @@ def add_thrusters(
 
 
 def _from_z(axis: tuple[float, float, float]) -> list[float]:
-    """The quaternion w, x, y, z that turns z to a unit ``axis`` the shortest way."""
+    """Return the quaternion w, x, y, z that turns z to a unit ``axis`` the shortest way."""
     x, y, z = axis
     if z < -1.0 + 1e-12:
         return [0.0, 1.0, 0.0, 0.0]

@@ -14,25 +14,25 @@ from ...robots.kinematics import ball_feet, standing_contacts
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.terrain import Ground, Terrain
 
-Span = tuple[float, float]
-Area = tuple[Span, Span]
-"""From, to in x; from, to in y [m]."""
+Interval = tuple[float, float]
+Area = tuple[Interval, Interval]
+"""Bounds of x and of y [m], each from and to."""
 
 THICKNESS = 0.02
-"""How far a tile reaches down below the least height of its area [m]."""
+"""Depth of a tile below the least height of its area [m]."""
 
 
 class TileKind(Parameters):
-    """How tiles differ from a level floor."""
+    """Differences of tiles from a level floor."""
 
-    size: Span = parameter((0.1, 0.2), unit="m", text="least and greatest side of a tile")
+    size: Interval = parameter((0.1, 0.2), unit="m", text="least and greatest side of a tile")
     height: float = parameter(
         0.01, unit="m", ge=0, le=0.2, text="no point of a tile is further above or below the mean"
     )
     slope: float = parameter(
         math.radians(5.0), unit="rad", ge=0, le=0.5, text="no tile leans by more, in any direction"
     )
-    friction: Span | None = parameter(
+    friction: Interval | None = parameter(
         (0.4, 1.0), text="least and greatest coefficient of a tile; none: that of the scene"
     )
     stiffness: float = parameter(
@@ -51,12 +51,12 @@ class TileKind(Parameters):
         return self
 
     def lay(self, area: Area, top: float, rng: np.random.Generator) -> Iterator[Ground]:
-        """The tiles of an area whose mean height is ``top`` [m]."""
+        """Return the tiles of an area whose mean height is ``top`` [m]."""
         for x in self._divide(area[0], rng):
             for y in self._divide(area[1], rng):
                 yield self._tile(x, y, top, rng)
 
-    def _divide(self, span: Span, rng: np.random.Generator) -> Iterator[Span]:
+    def _divide(self, span: Interval, rng: np.random.Generator) -> Iterator[Interval]:
         """Parts of a span with sides from ``size``; the last one is what is left."""
         start, end = span
         while end - start > 1e-9:
@@ -65,7 +65,7 @@ class TileKind(Parameters):
             yield start, stop
             start = stop
 
-    def _tile(self, x: Span, y: Span, top: float, rng: np.random.Generator) -> Ground:
+    def _tile(self, x: Interval, y: Interval, top: float, rng: np.random.Generator) -> Ground:
         lean, heading, place, grip, give = rng.random(5).tolist()
         slope = [
             math.tan(self.slope * lean) * f(2.0 * math.pi * heading) for f in (math.cos, math.sin)
@@ -87,10 +87,10 @@ class TileKind(Parameters):
 class TileParameters(TileKind):
     """An area of tiles, as a graph describes it."""
 
-    x: Span = parameter(text="from, to; ahead of where the robot starts", unit="m")
-    y: Span = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
+    x: Interval = parameter(text="from, to; ahead of where the robot starts", unit="m")
+    y: Interval = parameter((-0.75, 0.75), unit="m", text="from, to; to the left of it")
     top: float = parameter(unit="m", text="mean height of the tiles")
-    seed: int | None = parameter(None, ge=0, text="what they are drawn by; none: the robot's seed")
+    seed: int | None = parameter(None, ge=0, text="seed of the tiles; none: the robot's seed")
 
     @model_validator(mode="after")
     def _check_extent(self) -> Self:
@@ -100,7 +100,7 @@ class TileParameters(TileKind):
         return self
 
     def build(self, seed: int) -> tuple[Ground, ...]:
-        """The tiles."""
+        """Return the tiles."""
         rng = np.random.default_rng([STREAM, seed if self.seed is None else self.seed])
         return tuple(self.lay((self.x, self.y), self.top, rng))
 
@@ -110,23 +110,27 @@ STREAM = 30
 
 
 class UnevenParameters(TileKind):
-    """Tiles on all level ground of a scene that nobody is told of, drawn by the robot's seed.
+    """Tiles on all level ground of a scene that only the simulator knows of, drawn by the robot's seed.
 
     Floor and boxes sink by ``height`` below their tiles. The robot stands on a level tile at the start.
     """
 
     reach: float = parameter(
-        1.5, unit="m", gt=0, le=10.0, text="how far from the start there are tiles on the floor"
+        1.5,
+        unit="m",
+        gt=0,
+        le=10.0,
+        text="distance from the start up to which there are tiles on the floor",
     )
     margin: float = parameter(
         0.01,
         unit="m",
         ge=0,
-        text="how far the level tile reaches beyond what touches the ground: contact points, or ball feet",
+        text="margin of the level tile around what touches the ground: contact points, or ball feet",
     )
 
     def cover(self, scene: Terrain, robot: RobotDescription | None, seed: int) -> Terrain:
-        """The scene with its floor and its level boxes under tiles."""
+        """Return the scene with its floor and its level boxes under tiles."""
         rng = np.random.default_rng([STREAM, seed])
         start = self._start(robot)
         areas = [(-self.reach, self.reach)] * 2
@@ -151,7 +155,7 @@ class UnevenParameters(TileKind):
         )
 
     def _start(self, robot: RobotDescription | None) -> Area:
-        """The rectangle on which the robot stands at the start."""
+        """Return the rectangle on which the robot stands at the start."""
         if robot is None or not robot.contacts:
             return (-0.2, 0.2), (-0.2, 0.2)
         beyond = np.full(len(robot.contacts), self.margin)
@@ -184,6 +188,6 @@ class UnevenParameters(TileKind):
 
 
 def _covers(block: Ground, tile: Ground) -> bool:
-    """Whether no part of a tile is seen beside a box."""
+    """Check that no part of a tile is seen beside a box."""
     inside = all(block.least[k] <= tile.least[k] and tile.most[k] <= block.most[k] for k in (0, 1))
     return inside and block.most[2] > tile.most[2]

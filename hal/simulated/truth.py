@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 
 
 class TrueState(NamedTuple):
-    """What the simulator knows of the present instant.
+    """True state of the present instant.
 
     ``joint_position``, ``joint_velocity`` (n_joints,) [rad, rad/s]; ``com``, ``com_velocity`` and
     ``angular_momentum`` (3,) [m, m/s, N m s, world]; ``places`` (n, 3) [m, world] of all named places,
     of which ``contacts`` (n_contacts,) are those of the contact points, which lie ``below`` [m] under
-    them. ``ground`` is the surface of the ground, ``normal`` (3,) room for its normal.
+    them. ``ground`` is the surface of the ground, ``normal`` (3,) memory for its normal.
     """
 
     joint_position: Array1D
@@ -50,7 +50,7 @@ class TrueState(NamedTuple):
 
 @kernel
 def largest(values: Array1D) -> float:
-    """The largest value, and zero of none."""
+    """Return the largest value, and zero of none."""
     found = values[0] if values.shape[0] > 0 else 0.0
     for k in range(1, values.shape[0]):
         found = max(found, values[k])
@@ -59,7 +59,7 @@ def largest(values: Array1D) -> float:
 
 @kernel
 def report_contacts(instant: TrueState, peaks: TickRecord, report: RobotTruth) -> None:
-    """The contact points: where they are, the ground under them, and the mean force on each."""
+    """Report the contact points: where they are, the ground under them, and the mean force on each."""
     steps = peaks.steps[()]
     for point in range(instant.below.shape[0]):
         place = instant.contacts[point]

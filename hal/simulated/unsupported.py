@@ -1,5 +1,5 @@
-"""What of a robot's description the simulator cannot do: rotors that couple joints of two branches, and
-feet that cannot stand on level ground. A check of a graph looks at it without the simulator."""
+"""Parts of a robot's description that the simulator cannot do: rotors that couple joints of two branches, and feet that
+cannot stand on level ground. A check of a graph looks at it without the simulator."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ UNEVEN = 0.002
 
 
 def unsupported_motor(robot: RobotDescription) -> str:
-    """A text that says which motor's rotor cannot be simulated, and why; empty if all can."""
+    """Return a text that names the motor whose rotor cannot be simulated, and the reason; empty if all can."""
     names = [joint.name for joint in robot.joints]
     above = [joints_above(robot, joint.child) for joint in robot.joints]
     for motor in shared_motors(robot):
@@ -30,8 +30,8 @@ def unsupported_motor(robot: RobotDescription) -> str:
 
 
 def shared_motors(robot: RobotDescription) -> list[int]:
-    """The motors that need a tendon: those geared to several joints, unless the couplings of all
-    motors that have joints in common cancel, as in a differential of two equal motors."""
+    """Return the motors that need a tendon: those geared to several joints, unless the couplings of all motors that
+    have joints in common cancel, as in a differential of two equal motors."""
     geared, inertia = robot.joint_to_motor != 0.0, robot.motors.rotor_inertia
     coupling = np.abs(robot.rotor_matrix - np.diag(np.diag(robot.rotor_matrix)))
     small = 1e-12 * float(np.abs(robot.rotor_matrix).max(initial=0.0))
@@ -47,8 +47,8 @@ def shared_motors(robot: RobotDescription) -> list[int]:
 
 
 def uneven_contacts(robot: RobotDescription) -> str:
-    """A text that says which contact points are above the lowest one in the standing pose, so that
-    the robot cannot stand on level ground; empty if all are at one height."""
+    """Return a text that names the contact points above the lowest one in the standing pose, with which the robot
+    cannot stand on level ground; empty if there are none."""
     heights = standing_heights(robot)
     above = heights - heights.min(initial=np.inf)
     if float(above.max(initial=0.0)) <= UNEVEN:

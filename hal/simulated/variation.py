@@ -13,7 +13,7 @@ from ...mathematics.elementary import cos, sin
 from ...robots.description import RobotDescription
 from ..random_streams import Purpose, stream
 from .effects import CableParameters, JointEffects
-from .imu_effects import NOMINAL, ImuPlace, draw_place, draw_spread
+from .imu_effects import NOMINAL, ImuPose, draw_imu_pose, draw_spread
 from .parameters import SimulatorParameters
 
 
@@ -41,7 +41,7 @@ class Variation:
     link_inertia: tuple[float, ...] = ()
     friction_of_joint: tuple[float, ...] = ()
     rotor_inertia: tuple[float, ...] = ()
-    imu: ImuPlace = NOMINAL
+    imu: ImuPose = NOMINAL
     rotor_share: float = 1.0
     sole: tuple[float, float] | None = None
     gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)
@@ -136,7 +136,7 @@ def draw_variation(params: SimulatorParameters, robot: RobotDescription) -> Vari
         factors(Purpose.LINK_MASS, links.mass_spread, len(robot.links)), centres,
         factors(Purpose.LINK_INERTIA, links.inertia_spread, len(robot.links)),
         factors(Purpose.JOINT_FRICTION, joints.friction_spread, n), rotors,
-        draw_place(params.sensors.imu, params.seed) if params.sensors.imu.moved else NOMINAL,
+        draw_imu_pose(params.sensors.imu, params.seed) if params.sensors.imu.moved else NOMINAL,
         1.0 if actuators.gears is None else actuators.gears.output_share,
         None if ground.soles is None else (ground.soles.time_constant, ground.soles.damping_ratio),
         _gravity(params), factors(Purpose.LINK_LENGTH, links.length_spread, len(robot.links)),

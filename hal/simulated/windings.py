@@ -61,7 +61,7 @@ class WarmMotors(NamedTuple):
 def warm_motors(
     model: WindingModel, warm: WarmMotors, motors: DriveTrain, memory: PhysicsState
 ) -> None:
-    """What the motors can do at their temperature; a pack scales that further."""
+    """Limit the motors to the torques that they can give at their temperature; a pack scales that further."""
     for k in range(warm.constant.shape[0]):
         above = memory.winding_temperature[k] - NOMINAL
         weaker = max(1.0 - model.magnets * above, 0.05)
@@ -78,7 +78,7 @@ def warm_motors(
 def heat_windings(
     model: WindingModel, warm: WarmMotors, scratch: MotorScratch, memory: PhysicsState
 ) -> None:
-    """The temperatures after a physics step with these currents, as nominal torques."""
+    """Compute the temperatures after a physics step with these currents, as nominal torques."""
     for k in range(warm.heating.shape[0]):
         torque = scratch.torque[k]
         heat = warm.heating[k] * torque * torque * model.timestep
@@ -97,7 +97,7 @@ class Windings:
 
     Args:
         params: of the windings.
-        robot: whose description has a ``supply``; it or ``params`` say how windings are heated and cooled.
+        robot: whose description has a ``supply``; it or ``params`` describe how windings are heated and cooled.
         constant: the factors on the torque constants at 25 deg C, (n_joints,); a copy is kept.
         timestep: of the physics [s].
         memory: keeps the temperatures.
@@ -127,7 +127,7 @@ class Windings:
         self._memory.winding_temperature[:] = self._start
 
     def limiting(self, limits: MotorLimits) -> KernelCall:
-        """Sets what the motors can do at their temperature, before a physics step."""
+        """Return the call that sets the motors' limits at their temperature, before a physics step."""
         return signal_call(warm_motors, self._model, self.warm, limits.motors, self._memory)
 
     def heating(self, limits: MotorLimits) -> KernelCall:

@@ -25,9 +25,9 @@ _MOVE = 0.35
 _TURN_PACKETS = 400
 _UP = {"back": (1.0, 0.0, 0.0), "right side": (0.0, 1.0, 0.0), "feet": (0.0, 0.0, 1.0)}
 _IN_THE_AIR, _ABOVE_GROUND = 0.1, 0.04
-"""How high the soles hang for tests in the air, and before the robot is lowered [m]."""
+"""Height of the soles for tests in the air, and before the robot is lowered [m]."""
 _LOWERED_AFTER = 0.6
-"""From the first command of a graph until the person lowers the robot [s]."""
+"""Time from the first command of a graph until the person lowers the robot [s]."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class RobotByHand:
     # -- the person --------------------------------------------------------------------------
 
     def measure(self, request: Request) -> float:
-        """What a rule or the scale shows."""
+        """Return the reading of a rule [mm] or of the scale [kg]."""
         normal = self._draw.standard_normal()
         if request.target == "mass":
             return self.wiring.mass * (1.0 + self._errors.mass * normal)
@@ -153,7 +153,7 @@ class RobotByHand:
         self._put()
 
     def _hung(self, *, held: bool, height: float, lower_after: float | None) -> Twin:
-        """The robot in a gantry, in the noise of the errors."""
+        """Return the robot in a gantry, with the noise of the errors."""
         errors = self._errors
         params = SimulatorParameters(
             seed=self._seed, timestep=PACKET_TIME if lower_after is None else 0.0005,
@@ -180,7 +180,7 @@ class RobotByHand:
     # -- the devices -------------------------------------------------------------------------
 
     def _put(self) -> None:
-        """Let the encoders say where the joints are."""
+        """Write the joints' angles into the encoders' registers."""
         angles = self.robot.joint_to_motor @ self.joints
         wiring = self.wiring
         for k, name in enumerate(self.robot.transmission.motors):
@@ -237,7 +237,7 @@ class HandPort:
 
     @property
     def in_waiting(self) -> int:
-        """How many bytes were not read."""
+        """The number of bytes not yet read."""
         return len(self._waiting)
 
     def write(self, data: bytes | bytearray, /) -> int:
@@ -246,7 +246,7 @@ class HandPort:
         return len(data)
 
     def read(self, size: int = 1, /) -> bytes:
-        """What is waiting."""
+        """Read the bytes that wait."""
         self._waiting += self._stream()
         part, self._waiting = self._waiting[:size], self._waiting[size:]
         return part

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...blocks.signals import ImuReading
 from ...blocks.signals.robot import HEALTHY
-from ...robots.robot_description import MountedSensorPart
+from ...robots.robot_description import SensorMount
 from ..bear.protocol import (
     BROADCAST,
     CONFIG,
@@ -31,7 +31,7 @@ from ..sensors.imu import Imu
 CORRUPT, HOT, ENCODER, WATCHDOG, LIMIT, HARDWARE, FLASH = range(7)
 """The bits of the error byte."""
 VERSION = b"\x01\x00\x02\x00"
-"""What a ping answers; how the four bytes are to be read is not published."""
+"""The answer to a ping; the meaning of the four bytes is not published."""
 
 _STATUS = {register.address: register for register in STATUS.values()}
 _CONFIG = {register.address: register for register in CONFIG.values()}
@@ -39,7 +39,7 @@ _CONFIG = {register.address: register for register in CONFIG.values()}
 
 @lru_cache(maxsize=64)
 def _layout(addresses: bytes) -> tuple[struct.Struct, tuple[Register, ...]]:
-    """How the values of these status registers lie in an answer or an instruction."""
+    """Return the layout of these status registers' values in an answer or an instruction."""
     unknown = Register("unknown", 0xFF, "status", writable=False)
     registers = tuple(_STATUS.get(address, unknown) for address in addresses)
     kinds = "".join("f" if register.kind == "f32" else "I" for register in registers)
@@ -93,18 +93,18 @@ class EmulatedActuator:
 
     @property
     def error_byte(self) -> int:
-        """What the next answer reports."""
+        """The error byte of the next answer."""
         hot = self.status["winding_temperature"] > self.config["temp_limit_low"]
         return HEALTHY | self.errors | hot << HOT | self.corrupt << CORRUPT
 
     @property
     def driving(self) -> bool:
-        """Whether the drive follows its goals."""
+        """True if the drive follows its goals."""
         return self.status["torque_enable"] == Torque.ON and not self.errors
 
     @property
     def damping(self) -> bool:
-        """Whether the windings are shorted, which brakes."""
+        """True if the windings are shorted, which brakes."""
         return self.status["torque_enable"] == Torque.DAMPING
 
     def fail(self, bit: int) -> None:
@@ -114,7 +114,7 @@ class EmulatedActuator:
             self.status["torque_enable"] = Torque.ERROR
 
     def garble(self) -> None:
-        """A packet arrived damaged; the next answer says so."""
+        """Note that a packet arrived damaged, for the next answer."""
         self.corrupt = True
 
     def advance(self, seconds: float) -> None:
@@ -143,7 +143,7 @@ class EmulatedActuator:
             self.fail(LIMIT)
 
     def answer(self, frame: BusFrame) -> bytes | None:
-        """The data of the answer to an instruction for this actuator; ``None`` if it is silent."""
+        """Return the data of the answer to an instruction for this actuator; ``None`` if it is silent."""
         data = frame.data
         match frame.code:
             case Instruction.PING:
@@ -163,7 +163,7 @@ class EmulatedActuator:
         return None
 
     def bulk_read(self, addresses: bytes) -> bytes:
-        """The status registers of a bulk exchange's answer."""
+        """Return the status registers of a bulk exchange's answer."""
         layout, registers = _layout(addresses)
         status = self.status
         return layout.pack(
@@ -181,7 +181,7 @@ class EmulatedActuator:
             self._set(register, value, self.status)
 
     def answered(self) -> None:
-        """An answer with the error byte has gone out."""
+        """Note that an answer with the error byte has gone out."""
         self.corrupt = False
 
     def _read(
@@ -216,7 +216,7 @@ class EmulatedActuator:
             values[name] = value
 
     def _beyond(self, name: str, value: float) -> bool:
-        """Whether a goal is beyond its limit; the actuator then keeps the last one."""
+        """Check whether a goal is beyond its limit; the actuator then keeps the last one."""
         if name == "goal_iq":
             return abs(value) > self.config["limit_i_max"]
         if name == "goal_velocity" and self.config["mode"] != Mode.DIRECT_FORCE:
@@ -326,7 +326,7 @@ class EmulatedBoard:
     def __init__(self) -> None:
         self.mode = BoardMode.NOMINAL
         self.cooling = 0
-        self._imu = Imu("imu", MountedSensorPart(kind="imu", link=""))
+        self._imu = Imu("imu", SensorMount(kind="imu", link=""))
         self._pending = bytearray()
         self._calibrating = False
 
@@ -345,7 +345,7 @@ class EmulatedBoard:
                 del pending[:1]
 
     def packet(self, imu: ImuReading, closed: np.ndarray, mounted: bytes = b"") -> bytes:
-        """The next packet, with the bytes of mounted sensors; empty while the board does not stream."""
+        """Return the next packet, with the bytes of mounted sensors; empty while the board does not stream."""
         if self._calibrating:
             self._calibrating, self.mode, contacts = False, BoardMode.NOMINAL, 0xFF
         elif self.mode is not BoardMode.NOMINAL:

@@ -20,11 +20,11 @@ from .devices import EmulatedActuator
 from .snapshot import Attributes
 
 _SLOTS = 8
-"""How many sets of goals may be on their way."""
+"""Largest number of sets of goals on their way."""
 
 
 class EmulatedDrives:
-    """What all actuators of a robot give its joints.
+    """The torques that all actuators of a robot give its joints.
 
     In the modes torque and direct force the current is ``goal_iq``, in direct force plus
     ``P (goal_position - position) + D (goal_velocity - velocity)``, within ``limit_i_max``. The
@@ -89,7 +89,7 @@ class EmulatedDrives:
         self._not_stuck = np.zeros(n, dtype=np.bool_)
 
     def parts(self) -> list[Attributes]:
-        """What changes in a run."""
+        """Return the attributes that change in a run."""
         names = (
             "current", "position", "velocity", "stuck", "goals", "enabled", "damped", "queue", "dues", "first",
             "waiting", "last_due", "torque_sum", "torque_steps",
@@ -97,8 +97,7 @@ class EmulatedDrives:
         return [(self, names)]
 
     def take_goals(self, due: int) -> None:
-        """From physics step ``due`` on, follow what the actuators' registers say now; but not
-        before the goals that were taken earlier."""
+        """Queue the goals in the actuators' registers for physics step ``due``, but not before those queued earlier."""
         due = max(due, self.last_due)
         slot = (self.first + self.waiting) % _SLOTS
         if self.waiting < _SLOTS:
@@ -124,7 +123,7 @@ class EmulatedDrives:
             self.waiting -= 1
 
     def take_states(self) -> None:
-        """From now on follow which actuators are on, damping or off."""
+        """Follow from now on which actuators are on, damping or off."""
         for k, actuator in enumerate(self.actuators):
             follows = actuator.config["mode"] in (Mode.TORQUE, Mode.DIRECT_FORCE)
             self.enabled[k] = float(actuator.driving and follows)

@@ -40,7 +40,7 @@ class PseudoTerminal:
         self._thread.start()
 
     def send(self, data: bytes) -> None:
-        """What the device sends without being asked.
+        """Send data of the device that was not requested.
 
         While nobody reads and the terminal's buffer is full, this waits until ``stop`` is called.
         """
@@ -104,7 +104,7 @@ class TwinServer:
     In virtual time the twin's time goes on with the exchanges, and a packet of the board is there
     before the answers of the same exchange: a driver gets the same bytes in every run. In real time
     a thread lets it go on by the clock, at most as fast; where the machine is too slow for that,
-    ``behind`` says by how much.
+    ``behind`` is its lag.
 
     Args:
         twin: standing.
@@ -113,7 +113,7 @@ class TwinServer:
 
     Attributes:
         bus_path, board_path: the ports to open.
-        behind: by how much the twin's time is behind the clock [s].
+        behind: lag of the twin's time behind the clock [s].
     """
 
     def __init__(self, twin: Twin, *, virtual: bool, period: float) -> None:
@@ -178,7 +178,7 @@ class TwinServer:
         return answers
 
     def _instructions(self) -> list[bytes]:
-        """The whole instructions among what arrived. Bytes that belong to none are skipped."""
+        """Return the whole instructions among what arrived. Bytes that belong to none are skipped."""
         found: list[bytes] = []
         pending = self._pending
         while True:
@@ -209,7 +209,7 @@ class TwinServer:
             self._board.send(packets)
 
     def _pull(self, terminal: PseudoTerminal) -> None:
-        """A cable is pulled: its port is gone, from a thread of its own."""
+        """Pull a cable: its port is gone, from a thread of its own."""
         if terminal not in self._pulled:
             self._pulled.append(terminal)
             threading.Thread(target=terminal.close, daemon=True).start()

@@ -9,7 +9,7 @@ import numpy as np
 from ...blocks.signals import ExternalForce, ImuReading, JointState
 from ...mathematics.arrays import Array, Indices
 from ...mathematics.compiling.call_sequence import CallSequence
-from ...mathematics.compiling.library_call import LibraryCall
+from ...mathematics.compiling.foreign_call import ForeignCall
 from ...robots.robot_description import RobotDescription
 from ..bear.configuration import Hardware
 from ..bear.protocol import BROADCAST, Instruction, frame_bytes
@@ -21,7 +21,7 @@ from ..simulated.plant import Plant
 from ..simulated.state import DriveState, PhysicsState, SensorMemory, TickRecord
 from .devices import EmulatedActuator, EmulatedBoard, EmulatedBus
 from .drives import EmulatedDrives
-from .faults import ANSWERS, Faults, InjectedFault, apply_fault, corrupt_byte
+from .injected_faults import ANSWERS, InjectedFault, InjectedFaults, apply_fault, corrupt_byte
 from .snapshot import Attributes
 
 BRAKING = 0.5
@@ -55,7 +55,7 @@ class Twin:
         hardware: addresses, directions, offsets and the bus's period.
         tick: the control period [s].
         physics, record, gantry: memory of the plant and of the gantry.
-        faults: what goes wrong.
+        faults: of the devices.
         sensed: memory of the sensors that the description mounts; by default it is allocated.
     """
 
@@ -78,7 +78,7 @@ class Twin:
         self.board = EmulatedBoard()
         self.drives = EmulatedDrives(robot, hardware, self.actuators, record, BRAKING)
         self.limits = self.drives.limits
-        self.faults = Faults(faults, params.seed)
+        self.faults = InjectedFaults(faults, params.seed)
         self.lockstep = True
         """Whether time goes on with the exchanges; else only by ``advance``."""
         self.released = False
@@ -141,7 +141,7 @@ class Twin:
         self._begin_packet()
 
     def parts(self) -> list[Attributes]:
-        """What changes in a run, beside the memory that was given."""
+        """Return the attributes that change in a run, beside the memory that was given."""
         names = ("released", "exchanges", "zero", "before", "counted", "last_packet", "closed")
         found: list[Attributes] = [(self, names), *self.drives.parts()]
         found += [
@@ -184,7 +184,7 @@ class Twin:
         return data
 
     def read_board(self) -> bytes:
-        """What the sensor board has sent since it was read last.
+        """Read the bytes that the sensor board has sent since the last read.
 
         Raises:
             PulledCableError: its cable is pulled.
@@ -217,14 +217,14 @@ class Twin:
         self._send_packet()
 
     def set_push(self, push: ExternalForce | None) -> None:
-        """From now on this force from outside acts, once the gantry has let go; ``None``: none."""
+        """Apply this force from outside from now on, once the gantry has let go; ``None``: none."""
         self._push = push
         self._pushed = self._step if push is None else self.plant.simulating(self, 1, push)
 
     def torque_call(
         self, step: Indices, position: Array, velocity: Array, speed: Array, out: Array
-    ) -> LibraryCall:
-        """The torques of the drives, and of the gantry until it lets go."""
+    ) -> ForeignCall:
+        """Return the call for the torques of the drives, and of the gantry until it lets go."""
         holding = self._gantry.torque_call(step, position, velocity, speed, self._held)
 
         def write() -> None:
@@ -234,7 +234,7 @@ class Twin:
                 holding.run()
                 np.add(out, self._held, out=out)
 
-        return LibraryCall(write, 0)
+        return ForeignCall(write, 0)
 
     def clear_record(self) -> None:
         """Begin a new record of torques, loads and limits; packets go on."""
@@ -243,7 +243,7 @@ class Twin:
         self.plant.clear_record()
 
     def _release_gantry(self) -> None:
-        """The gantry lets go when all drives are on and one is told to give a current."""
+        """Let go of the robot when all drives are on and one has a current as its goal."""
         if not self.released and self.drives.enabled.all() and self.drives.goals[:, 0].any():
             self.released = True
             self.zero = self.exchanges - 1
@@ -271,7 +271,7 @@ class Twin:
         self.counted = int(self._record.steps)
 
     def _send_packet(self) -> None:
-        """A packet of the IMU and the switches: the accelerometer's mean since the last one."""
+        """Send a packet of the IMU and the switches: the accelerometer's mean since the last one."""
         record = self._record
         np.subtract(record.accelerometer, self.before, out=self._force)
         np.divide(self._force, int(record.steps) - self.counted, out=self._force)
@@ -324,13 +324,13 @@ class Twin:
                 actuator.status["torque_enable"] = 0.0
 
     def _feed_drives(self) -> None:
-        """The drives measure their supply and their windings."""
+        """Write the supply's voltage and the windings' temperature into the drives' registers."""
         for k, actuator in enumerate(self.actuators):
             actuator.status["input_voltage"] = self.plant.voltage(SUPPLY)
             actuator.status["winding_temperature"] = self.plant.temperature(k)
 
     def _answer_with_faults(self, device: int, answer: bytes) -> bytes:
-        """What travels of an answer."""
+        """Return the bytes of an answer that really travel."""
         if not self.faults:
             return answer
         name = self._names[self._by_device[device]]
@@ -349,14 +349,14 @@ def standing_twin(
     robot: RobotDescription, params: SimulatorParameters, hardware: Hardware,
     tick: float = 0.002, faults: tuple[InjectedFault, ...] = (),
 ) -> Twin:  # fmt: skip
-    """A twin that stands in its gantry.
+    """Build a twin that stands in its gantry.
 
     Args:
         robot: the description.
         params: world, disturbances and sensors' errors.
         hardware: addresses, directions, offsets and the bus's period.
         tick: the control period [s], to which noise and start phase refer.
-        faults: what goes wrong.
+        faults: of the devices.
 
     Raises:
         StartError: the robot does not stand as its description says.

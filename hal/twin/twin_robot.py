@@ -22,7 +22,7 @@ from ..simulated.simulated_robot import (
 )
 from ..simulated.state import DriveState, PhysicsState, TickRecord
 from ..simulated.unsupported import uneven_contacts, unsupported_motor
-from .faults import InjectedFault
+from .injected_faults import InjectedFault
 from .snapshot import Attributes, ObjectSnapshot
 from .twin import Twin
 
@@ -41,12 +41,12 @@ class VirtualBusPort:
         self._now = 0.0
 
     def now(self) -> float:
-        """The virtual time [s]."""
+        """Return the virtual time [s]."""
         return self._now
 
     @property
     def in_waiting(self) -> int:
-        """How many bytes were received and not read, with those that came late."""
+        """The number of bytes received and not read, with those that came late."""
         self._received += self._twin.read_late()
         return len(self._received)
 
@@ -89,15 +89,15 @@ class VirtualBoardPort(VirtualBusPort):
 class TwinParameters(SimulatorParameters, DriveParameters):
     """The parameters of ``TwinRobot``: those of ``MujocoRobot``, and the drives'."""
 
-    armed: bool = parameter(True, text="whether the drives are switched on; else only watched")
+    armed: bool = parameter(True, text="switch the drives on; else they are only watched")
     hardware: str = parameter(
         "", text="file of the hardware, relative to the graph; none: addresses in order, no offsets"
     )
-    faults: list[InjectedFault] = parameter([], text="what goes wrong, and when")
+    faults: list[InjectedFault] = parameter([], text="faults of the devices, with their times")
 
 
 class Registers(Signal):
-    """What the actuators, the buses and the driver keep."""
+    """Registers of the actuators, the buses and the driver."""
 
     values = Field("n_kept", text="all numbers in a fixed order")
 
@@ -124,7 +124,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
     params: TwinParameters
 
     gantry = State(DriveState, text="the gantry's hold on the robot")
-    record = State(TickRecord, text="what happened in the physics steps of the last tick")
+    record = State(TickRecord, text="sums over the physics steps of the last tick")
     rest = State(Registers, text="registers, counters and commands on their way, for a snapshot")
 
     @classmethod
@@ -213,7 +213,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
         self._driver.loop.cycle()
 
     def now(self) -> float:
-        """The virtual time [s]."""
+        """Return the virtual time [s]."""
         return self.twin.exchanges * self._hardware.bus.period
 
     def read(self) -> None:
@@ -262,7 +262,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
         self._driver.loop.restored()
 
     def metrics(self) -> Mapping[str, Metric]:
-        """What was drawn from the seed, and what became of the drives."""
+        """Return the values drawn from the seed, and the outcome of the drives."""
         return {**self.twin.plant.metrics(), **super().metrics()}
 
     @classmethod

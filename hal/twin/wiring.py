@@ -1,4 +1,4 @@
-"""How a robot is really built and wired, which its hardware's file may say otherwise."""
+"""The true build and wiring of a robot, from which its hardware's file may differ."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from .twin import Twin, standing_twin
 
 @dataclass
 class Wiring:
-    """How a robot is really built.
+    """The true build of a robot.
 
     Attributes:
         addresses: of every motor, by name; a motor that is left out is not on the bus.
-        signs, zeros: of every motor: its drive says ``sign * (angle + zero)``.
-        ratios: of every motor, how far its drive turns for its angle.
-        jig_error: by how much every joint is off in the jig of the zero pose [rad].
+        signs, zeros: of every motor: its drive reads ``sign * (angle + zero)``.
+        ratios: of every motor, its drive's turn per angle.
+        jig_error: of every joint, in the jig of the zero pose [rad].
         limits: of every joint [rad], by name.
-        lengths: what a rule shows at a joint [m], by name.
-        mass: what the scale shows [kg].
+        lengths: reading of a rule at a joint [m], by name.
+        mass: reading of the scale [kg].
         deaf: whether the bus runs at another rate than the file says.
         voltage: of the supply [V].
         imu, gyro: columns are the robot's axes in the frame of accelerometer and gyroscope.
@@ -72,7 +72,7 @@ class Wiring:
 
     @classmethod
     def of(cls, robot: RobotDescription) -> Wiring:
-        """The wiring that a robot should have: addresses from 1, no signs and zeros."""
+        """Return the wiring that a robot should have: addresses from 1, no signs and zeros."""
         return cls(
             addresses={name: k + 1 for k, name in enumerate(robot.transmission.motors)},
             limits={joint.name: joint.limits or (-1.0, 1.0) for joint in robot.joints},
@@ -82,7 +82,7 @@ class Wiring:
         )
 
     def hardware(self, robot: RobotDescription) -> Hardware:
-        """The file that this wiring should have."""
+        """Return the file that this wiring should have."""
         told = Hardware.for_twin(robot)
         names = robot.transmission.motors
         nominal = told.drives.torque_constant
@@ -108,12 +108,12 @@ class Wiring:
         return told.model_copy(update={"board": board, "motors": motors})
 
     def twin(self, robot: RobotDescription, params: SimulatorParameters, *, held: bool) -> Twin:
-        """The robot of this wiring as its ports see it.
+        """Build the robot of this wiring as its ports see it.
 
         Args:
             robot: the description.
             params: world, disturbances and sensors' errors.
-            held: whether somebody holds its joints until it is told to give a current.
+            held: somebody holds its joints until it gets a current.
         """
         twin = standing_twin(robot, params, self.hardware(robot))
         twin.released = not held

@@ -1,4 +1,4 @@
-"""The differences between two recordings: which signals differ most, where, and by how much."""
+"""The differences between two recordings: the signals that differ most, with place and size."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class ComparisonError(AloftError):
 
 @dataclass(frozen=True)
 class SignalDifference:
-    """How much one signal differs.
+    """The difference of one signal.
 
     Attributes:
         signal, element, unit: what it is; the element is the one that differs most.
@@ -46,7 +46,7 @@ class SignalDifference:
 
 @dataclass(frozen=True)
 class RunDifference:
-    """How two runs differ.
+    """The difference of two runs.
 
     Attributes:
         align: how they are aligned.
@@ -68,7 +68,7 @@ class RunDifference:
 
 
 def lift_off_tick(run: RecordedRun) -> int | None:
-    """The tick of a run's first lift-off; ``None`` if there is none or it cannot be told."""
+    """Return the tick of a run's first lift-off; ``None`` if there is none or it cannot be told."""
     ports = scene_ports(run.header)
     if ports is None or ports.contact_force is None or not len(run.ticks):
         return None
@@ -153,7 +153,8 @@ def _share(found: SignalDifference) -> float:
 
 
 def _gaps(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The absolute differences; none where both are not finite in the same way, else infinite."""
+    """Return the absolute differences; none where both are not finite in the same way, else
+    infinite."""
     with np.errstate(invalid="ignore"):
         gaps = np.abs(a - b)
     same = (a == b) | (np.isnan(a) & np.isnan(b))

@@ -73,7 +73,8 @@ class Channel:
 
 
 def known_channels(run: RecordedRun) -> list[Channel]:
-    """The channels for which the recording has signals. Without a robot there is only ``/log``."""
+    """Return the channels for which the recording has signals. Without a robot there is only
+    ``/log``."""
     channels = [_json("/log", "foxglove.Log", tuple(_notes(run)))]
     robot = run.header.robot
     if robot is None:
@@ -132,8 +133,8 @@ def _joint_codec(robot: RobotDescription) -> Codec:
 
 
 def _sensor_codec(message: RosMessage, frame: str) -> tuple[Codec, Mapping[str, str]]:
-    """The codec of a mounted sensor, whose numbers are in the axes of its link, and the names in the
-    message of its signal's fields."""
+    """Return the codec of a mounted sensor, whose numbers are in the axes of its link, and the
+    names in the message of its signal's fields."""
     fields = {field: path.replace(".", "_") for field, path in message.fields.items()}
     shown = _IMU_FIELDS if message.type == IMU_TYPE else tuple(fields.values())
     return _codec(message.type, {"frame_id": frame}, shown), fields
@@ -166,7 +167,7 @@ def _joints(port: str, codec: Codec, batch: RecordedRows) -> Iterator[Timed]:
 def _numbers(
     port: str, fields: Mapping[str, str], codec: Codec, batch: RecordedRows
 ) -> Iterator[Timed]:
-    """A message a tick with the ``fields`` of a port, each with its name in the message."""
+    """Yield a message a tick with the ``fields`` of a port, each with its name in the message."""
     values = {name: batch.signal(f"{port}.{field}") for field, name in fields.items()}
     rest = _NO_ORIENTATION if codec.type.name == IMU_TYPE else {}
     for k, instant in enumerate(_instants(batch)):
@@ -177,7 +178,7 @@ def _numbers(
 def _wrench(
     ports: ScenePorts, on_foot: list[bool], codec: Codec, batch: RecordedRows
 ) -> Iterator[Timed]:
-    """The force on a foot and its torque about the middle of the foot's contact points."""
+    """Yield the force on a foot and its torque about the middle of the foot's contact points."""
     assert ports.contact_force is not None and ports.contact_position is not None
     force = batch.signal(ports.contact_force)[:, on_foot]
     place = batch.signal(ports.contact_position)[:, on_foot]
@@ -204,8 +205,8 @@ def _poses(
 
 
 def scene_update(run: RecordedRun, robot: RobotDescription, instant: int) -> dict[str, Any]:
-    """A ``foxglove.SceneUpdate``: the links' surfaces or else their shapes, each fixed to its link's frame,
-    and the ground."""
+    """Make a ``foxglove.SceneUpdate``: the links' surfaces or else their shapes, each fixed to its
+    link's frame, and the ground."""
     entities, surfaces = [], robot_surfaces(robot).links
     for link in robot.links:
         if link.name in surfaces:
@@ -278,13 +279,13 @@ def _solid(place: Any, turn: Any, size: Any, color: Any) -> dict[str, Any]:
 
 
 def _rgba(color: int) -> tuple[float, float, float, float]:
-    """Red, green, blue and alpha of 0xRRGGBB."""
+    """Return red, green, blue and alpha of 0xRRGGBB."""
     red, green, blue = (byte / 255.0 for byte in color.to_bytes(3, "big"))
     return red, green, blue, 1.0
 
 
 def _triangles(corners: Any, triangles: Any, color: Any) -> dict[str, Any]:
-    """A surface as a ``foxglove.TriangleListPrimitive``."""
+    """Make a surface as a ``foxglove.TriangleListPrimitive``."""
     solid = _solid((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), color)
     return {
         "pose": solid["pose"],
@@ -456,7 +457,7 @@ def export_bag(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
 
 
 def _json_messages(fields: Sequence[RecordedField], batch: RecordedRows) -> Iterator[Timed]:
-    """One message a tick with all fields of a port."""
+    """Yield one message a tick with all fields of a port."""
     instants = nanoseconds(batch.header.base_rate, batch.ticks).tolist()
     lists = {field.field_name: batch.signal(field.name).tolist() for field in fields}
     for k, instant in enumerate(instants):
@@ -481,7 +482,7 @@ EXPORTS: Mapping[str, Callable[[RecordedRun, Path, Sequence[str]], None]] = {
     "mcap": export_mcap,
     "bag": export_bag,
 }
-"""By the file name's ending."""
+"""Exporters by the ending of the file's name."""
 
 
 def export(kind: str, run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:

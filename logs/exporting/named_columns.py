@@ -55,7 +55,7 @@ class NamedColumns:
                 self.columns.append(NamedColumn(name, {**about, "unit": unit, "element": element}))
 
     def values(self, batch: RecordedRows) -> list[NDArray[Any]]:
-        """The values of each column in the ticks of a batch, (ticks,) each."""
+        """Return the values of each column in the ticks of a batch, (ticks,) each."""
         found: list[NDArray[Any]] = [batch.ticks, batch.ticks / self._rate]
         for field in self._fields:
             values = batch.signal(field.name)
@@ -64,7 +64,8 @@ class NamedColumns:
 
 
 def element_labels(field: RecordedField, robot: RobotDescription | None) -> list[str]:
-    """A label for every element of a field, in C order: ``left_toe, x``; of a scalar, an empty one."""
+    """Return a label for every element of a field, in C order: ``left_toe, x``; of a scalar, an
+    empty one."""
     axes = []
     for size, length in zip(field.dimensions, field.shape, strict=True):
         names = names_along(field, size, length, robot)

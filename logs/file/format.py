@@ -99,7 +99,7 @@ class RecordedField:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Self:
-        """The field from the plain data that ``dataclasses.asdict`` made."""
+        """Read the field from the plain data that ``dataclasses.asdict`` made."""
         values = {int(number): name for number, name in data["values"].items()}
         tuples = {name: tuple(data[name]) for name in ("shape", "dimensions", "signals")}
         return cls(**{**data, "values": values, **tuples})
@@ -107,7 +107,7 @@ class RecordedField:
 
 @dataclass(frozen=True)
 class RecordedLayout:
-    """Where every field lies in a buffer of ``size`` bytes; see ``runtime.layout``."""
+    """The places of all fields in a buffer of ``size`` bytes; see ``runtime.layout``."""
 
     fields: tuple[RecordedField, ...]
     lengths: Mapping[str, int]
@@ -115,18 +115,19 @@ class RecordedLayout:
     size: int
 
     def layout(self) -> Layout:
-        """The layout as the runtime uses it."""
+        """Return the layout as the runtime uses it."""
         slots = {f.name: Slot(f.dtype, f.start, f.shape) for f in self.fields}
         return Layout(slots, dict(self.lengths), dict(self.offsets), self.size)
 
     def schema_hash(self) -> str:
-        """16 hexadecimal digits that are equal for equal names, types, shapes, units and frames."""
+        """Return 16 hexadecimal digits that are equal for equal names, types, shapes, units and
+        frames."""
         parts = [[f.name, f.dtype, f.start, f.shape, f.unit, f.frame] for f in self.fields]
         return blake2b(json.dumps(parts).encode(), digest_size=8).hexdigest()
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Self:
-        """The layout from the plain data that ``dataclasses.asdict`` made."""
+        """Read the layout from the plain data that ``dataclasses.asdict`` made."""
         fields = tuple(RecordedField.from_json(entry) for entry in data["fields"])
         return cls(fields, data["lengths"], data["offsets"], data["size"])
 
@@ -208,7 +209,7 @@ class Header:
         return {"bus": self.bus.schema_hash(), "state": self.state.schema_hash()}
 
     def to_json(self) -> str:
-        """The header as JSON text."""
+        """Write the header as JSON text."""
         data = asdict(self) | {"schema_hashes": self.schema_hashes}
         data["robot"] = self.robot and self.robot.model_dump(mode="json", context={"looks": True})
         data["bus_start"] = b64encode(self.bus_start).decode()
@@ -216,7 +217,7 @@ class Header:
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """The header that ``to_json`` wrote."""
+        """Read the header that ``to_json`` wrote."""
         data = json.loads(text)
         del data["schema_hashes"]
         robot = data["robot"]
@@ -231,7 +232,7 @@ class Header:
 
 
 def _terrain(data: Mapping[str, Any] | None) -> Terrain | None:
-    """The terrain from plain data; a run without a simulated world has none."""
+    """Read the terrain from plain data; a run without a simulated world has none."""
     if data is None:
         return None
     blocks, fields = data["blocks"], data.get("fields", ())
@@ -244,7 +245,7 @@ def _terrain(data: Mapping[str, Any] | None) -> Terrain | None:
 
 
 def _tuples(data: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of a dataclass from plain data, with tuples for lists."""
+    """Return the values of a dataclass from plain data, with tuples for lists."""
 
     def convert(value: Any) -> Any:
         return tuple(map(convert, value)) if isinstance(value, list | tuple) else value
@@ -262,34 +263,36 @@ class RecordedRows:
     layout: Layout
 
     def fields(self) -> list[RecordedField]:
-        """Every field of every output, in file order."""
+        """Return every field of every output, in file order."""
         return [entry for entry in self.header.bus.fields if not entry.constant]
 
     def signal(self, name: str) -> NDArray[Any]:
-        """One field at every tick, (n, ...). Raises ``KeyError``."""
+        """Return one field at every tick, (n, ...). Raises ``KeyError``."""
         return self.layout.view(self.rows, name)
 
 
 def entity_of(kind: str, name: str) -> str:
-    """The entity that holds ``block.port.field``; nested blocks nest."""
+    """Return the entity that holds ``block.port.field``; nested blocks nest."""
     return f"{kind}/{name.replace('.', '/')}"
 
 
 def nanoseconds(base_rate: float, ticks: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The instant of every tick on the timeline ``t``, as integers, because floats would round."""
+    """Return the instant of every tick on the timeline ``t``, as integers, because floats would
+    round."""
     instants: NDArray[np.int64] = np.rint(ticks * (1e9 / base_rate)).astype(np.int64)
     return instants
 
 
 def spans(ticks: NDArray[np.int64]) -> NDArray[np.int64]:
-    """First and last (m, 2) of each stretch without a gap of ``ticks`` (n,), which are in order."""
+    """Return first and last (m, 2) of each stretch without a gap of ``ticks`` (n,), which are in
+    order."""
     ends = np.flatnonzero(np.diff(ticks) != 1)
     first = np.concatenate([ticks[:1], ticks[ends + 1]])
     return np.stack([first, np.concatenate([ticks[ends], ticks[-1:]])], axis=1)
 
 
 def time_columns(header: Header, ticks: NDArray[np.int64]) -> list[Any]:
-    """The timelines ``t`` and ``tick`` at some ticks (n,)."""
+    """Return the timelines ``t`` and ``tick`` at some ticks (n,)."""
     import rerun as rr
 
     instants = nanoseconds(header.base_rate, ticks).astype("timedelta64[ns]")
@@ -297,6 +300,6 @@ def time_columns(header: Header, ticks: NDArray[np.int64]) -> list[Any]:
 
 
 def timed(header: Header, ticks: NDArray[np.int64], texts: Sequence[str]) -> list[str]:
-    """Texts with the time before each, as the viewer's own column of times is too narrow for them."""
+    """Write the time before each text, as the viewer's own column of times is too narrow for them."""
     times = (ticks / header.base_rate).tolist()
     return [f"{time:.3f} s  {text}" for time, text in zip(times, texts, strict=True)]

@@ -15,8 +15,8 @@ from ...runtime.language.signals import Field, Signal
 from ...runtime.language.stages import BlockSpec, CheckedGraph
 from ...runtime.language.terrain import SupportsScene, Terrain
 from ...runtime.running.memory import BoundGraph
+from .dependencies import contents, digests, files_read, parameter_files, project_state
 from .format import Header, RecordedBlock, RecordedField, RecordedLayout
-from .surroundings import contents, digests, files_read, parameter_files, project_state
 
 RECORDED_VERSIONS = (
     "aloft", "numpy", "llvmlite", "mujoco-core", "pin", "qpsolvers", "daqp", "casadi", "rerun-sdk",
@@ -29,7 +29,7 @@ _NOTHING = RecordedLayout((), {}, {}, 0)
 
 
 def header_of(bound: BoundGraph) -> Header:
-    """The header of a run of ``bound``, as its memory is now."""
+    """Make the header of a run of ``bound``, as its memory is now."""
     memory, graph = bound.memory, bound.graph
     header = make_header(
         graph,
@@ -52,7 +52,7 @@ def make_header(
     first_tick: int = 0,
     clock: str = "",
 ) -> Header:
-    """The header of a run of ``graph``; without ``state``, one that can hold no keyframes."""
+    """Make the header of a run of ``graph``; without ``state``, one that can hold no keyframes."""
     files = parameter_files(graph)
     return Header(
         name=graph.name,
@@ -85,7 +85,7 @@ def make_header(
 
 
 def terrain_of(graph: CheckedGraph) -> Terrain | None:
-    """The ground of the first block that has a world."""
+    """Return the ground of the first block that has a world."""
     scenes = (spec.params for spec in graph.blocks if isinstance(spec.params, SupportsScene))
     return next((params.build_scene(graph.robot) for params in scenes), None)
 
@@ -103,14 +103,14 @@ def _parameters(graph: CheckedGraph) -> Iterator[tuple[str, float | str]]:
 
 
 def recorded_signals(bound: BoundGraph) -> tuple[RecordedField, ...]:
-    """All fields of the bus."""
+    """Return all fields of the bus."""
     graph = bound.graph
     declared = {**dict(_outputs(graph)), **dict(_constants(graph))}
     return _recorded(bound.memory.bus.layout, declared, _carried(graph)).fields
 
 
 def recorded_states(bound: BoundGraph) -> tuple[RecordedField, ...]:
-    """All fields of the declared state."""
+    """Return all fields of the declared state."""
     return _recorded(bound.memory.state.layout, dict(_states(bound.graph))).fields
 
 
@@ -141,7 +141,7 @@ def _states(graph: CheckedGraph) -> Iterator[tuple[str, Declared]]:
 
 
 def _carried(graph: CheckedGraph) -> dict[str, Quantity]:
-    """Unit and frame of the outputs that carry what is wired, by ``block.port.field``."""
+    """Return unit and frame of the outputs that carry what is wired, by ``block.port.field``."""
     return {
         f"{spec.path}.{name}": quantity
         for spec in graph.blocks
@@ -178,14 +178,15 @@ def _recorded(
 
 
 def _names(signal: type[Signal]) -> tuple[str, ...]:
-    """The names of the signal's class and of the signals that it derives from, nearest first."""
+    """Return the names of the signal's class and of the signals that it derives from, nearest
+    first."""
     return tuple(
         kind.__name__ for kind in signal.__mro__ if issubclass(kind, Signal) and kind is not Signal
     )
 
 
 def versions() -> dict[str, str]:
-    """The versions of Python and of every package that computes something in a run."""
+    """Return the versions of Python and of every package that computes something in a run."""
     found = {"python": platform.python_version()}
     for name in RECORDED_VERSIONS:
         try:
@@ -196,7 +197,8 @@ def versions() -> dict[str, str]:
 
 
 def machine() -> dict[str, str]:
-    """What the bytes of a run may depend on beside versions: processor, system, C library, BLAS."""
+    """Describe the machine, on which a run's bytes may depend beside versions: processor, system, C
+    library, BLAS."""
     import numpy as np
 
     try:
@@ -215,8 +217,8 @@ def machine() -> dict[str, str]:
 
 
 def _c_library() -> str:
-    """The C library, whose functions round otherwise in other versions: ``glibc 2.31``; empty where
-    that cannot be found out."""
+    """Return the name of the C library, whose functions round otherwise in other versions: ``glibc
+    2.31``; empty where that cannot be found out."""
     found = " ".join(platform.libc_ver()).strip()
     if found:
         return found
@@ -227,8 +229,8 @@ def _c_library() -> str:
 
 
 def _blas_kernel() -> str:
-    """The routines that OpenBLAS has chosen for this processor, such as ``SkylakeX``; it rounds
-    otherwise with others. Empty where that cannot be found out."""
+    """Return the routines that OpenBLAS has chosen for this processor, such as ``SkylakeX``; it
+    rounds otherwise with others. Empty where that cannot be found out."""
     try:
         lines = Path("/proc/self/maps").read_text(encoding="utf-8").splitlines()
     except OSError:

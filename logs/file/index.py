@@ -23,7 +23,7 @@ from . import protobuf
 
 FOOTER_SIZE = 32
 FOOTER_END = b"RRF2FOOT\x01\0\0\0"
-"""How a file ends that has one index."""
+"""Last bytes of a file that has one index."""
 _FOOTER = Struct("<QQI")
 _SEED = 7850921
 _MANIFEST = 1
@@ -62,7 +62,7 @@ class Index:
             self._pieces.append((piece, places))
 
     def whole(self) -> bytes:
-        """The index of all pieces together."""
+        """Join the index of all pieces."""
         stores: dict[bytes, _Store] = {}
         for piece, places in self._pieces:
             for number, manifest in protobuf.fields(piece):
@@ -96,7 +96,7 @@ class Index:
 
 
 def _manifest(name: bytes, store: _Store) -> bytes:
-    """The manifest of a whole store."""
+    """Write the manifest of a whole store."""
     import pyarrow as pa
 
     schema = pa.schema(store.columns.values()).serialize().to_pybytes()
@@ -112,7 +112,7 @@ def _manifest(name: bytes, store: _Store) -> bytes:
 
 
 def _filled(table: Any) -> Any:
-    """The table with false and zero for flags and counts that a piece had no column for."""
+    """Fill the columns that a piece lacks with false for flags and zero for counts."""
     import pyarrow as pa
 
     for at, column in enumerate(table.schema):
@@ -152,7 +152,7 @@ def _written_table(table: Any) -> bytes:
 
 
 def footer(place: int, index: bytes) -> bytes:
-    """The end of a file whose index stands at ``place``."""
+    """Return the end of a file whose index stands at ``place``."""
     return _FOOTER.pack(place, len(index), xxhash32(index, _SEED)) + FOOTER_END
 
 
@@ -163,7 +163,7 @@ _LANES = int.from_bytes(_MASK.to_bytes(8, "little") * 4, "little")
 
 
 def xxhash32(data: bytes, seed: int) -> int:
-    """The xxHash of 32 bits (Collet, https://github.com/Cyan4973/xxHash).
+    """Compute the xxHash of 32 bits (Collet, https://github.com/Cyan4973/xxHash).
 
     Its four lanes are the parts of one long integer, 64 bits each: Python takes as long for an
     operation with that as with a short one.
@@ -194,6 +194,6 @@ def xxhash32(data: bytes, seed: int) -> int:
 
 
 def _turned(value: int, count: int) -> int:
-    """The lower 32 bits of a number, rotated left."""
+    """Rotate the lower 32 bits of a number left."""
     value &= _MASK
     return (value << count | value >> 32 - count) & _MASK

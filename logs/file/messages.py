@@ -35,7 +35,7 @@ HEAD = Struct("<QQ")
 END = 0
 """The kind of the message that closes a file."""
 CLOSING = HEAD.pack(END, 0)
-"""What closes a file without an index."""
+"""Message that closes a file without an index."""
 ARROW = 2
 """The kind of a message that holds an Arrow table."""
 _LAST_KIND = 3
@@ -47,14 +47,14 @@ _CHECKED = _SEAL.size - 4
 SEAL_SIZE = len(_MARK) + _SEAL.size
 _SEARCHED = 1 << 20
 _CLOSING_SIZES = {len(CLOSING): CLOSING, FOOTER_SIZE: FOOTER_END}
-"""How a closed file may end: the bytes behind the last seal, by their number."""
+"""Possible ends of a closed file: the bytes behind the last seal, by their number."""
 
 
 class Content(IntEnum):
-    """What a message holds."""
+    """The contents of a message."""
 
     PICTURE = 0
-    """What only the viewer shows."""
+    """Data that only the viewer shows."""
     START = 1
     """The header."""
     ROWS = 2
@@ -64,7 +64,7 @@ class Content(IntEnum):
     UNKNOWN = 6
     """Any of these, in a file without seals."""
     INDEX = 7
-    """Where all the others are, for Rerun's tools."""
+    """Index of all other messages, for Rerun's tools."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Damage:
 
 @dataclass(frozen=True)
 class Scan:
-    """What a file consists of.
+    """The messages of a file and its damages.
 
     Attributes:
         path: the file.
@@ -131,14 +131,14 @@ class Scan:
     end: int
 
     def of(self, content: Content) -> list[FileMessage]:
-        """The messages with that content; in a file without seals all messages with tables."""
+        """Return the messages with that content; in a file without seals all messages with tables."""
         wanted = (content, Content.UNKNOWN)
         return [m for m in self.messages if m.kind == ARROW and m.content in wanted]
 
 
 def sealed(head: bytes, body: bytes, seal: FileMessage, begun: int = 0) -> bytes:
-    """A message with its seal: ``head`` and ``body`` as Rerun made them, ``begun`` the CRC-32 of the
-    file's head for the first message of a file and else zero."""
+    """Seal a message: ``head`` and ``body`` as Rerun made them, ``begun`` the CRC-32 of the file's
+    head for the first message of a file and else zero."""
     kind, length = HEAD.unpack(head)
     fields = (seal.number, int(seal.content), seal.first, seal.last, 0)
     whole = HEAD.pack(kind, length + SEAL_SIZE) + body + _MARK + _SEAL.pack(*fields, 0)[:_CHECKED]
@@ -146,7 +146,7 @@ def sealed(head: bytes, body: bytes, seal: FileMessage, begun: int = 0) -> bytes
 
 
 def closing(place: int, index: bytes, number: int) -> bytes:
-    """The message that closes, at ``place``, a file with this number of messages."""
+    """Make the message that closes, at ``place``, a file with this number of messages."""
     message = sealed(
         HEAD.pack(END, len(index)), index, FileMessage(0, 0, END, Content.INDEX, number)
     )
@@ -154,7 +154,8 @@ def closing(place: int, index: bytes, number: int) -> bytes:
 
 
 def split(data: bytes) -> Iterator[tuple[int, bytes, bytes]]:
-    """Places, heads and bodies of the messages of a Rerun file in memory; the closing one is last."""
+    """Yield places, heads and bodies of the messages of a Rerun file in memory; the closing one is
+    last."""
     place = FILE_HEAD
     kind = ARROW
     while kind != END and place + HEAD.size <= len(data):
@@ -213,7 +214,7 @@ class _Scanner:
         return Scan(self._path, self._size, tuple(found), named, self._sealed, closed, end)
 
     def _at(self, place: int, *, first: bool) -> FileMessage | None:
-        """The intact message at ``place``."""
+        """Read the intact message at ``place``."""
         if place + HEAD.size > self._size:
             return None
         self._file.seek(place)
@@ -230,7 +231,7 @@ class _Scanner:
         return _checked(place, head, body, known)
 
     def _closes(self, place: int, number: int) -> bool:
-        """Whether the file is closed at ``place``, behind so many messages, and ends there."""
+        """Tell whether the file is closed at ``place``, behind so many messages, and ends there."""
         self._file.seek(place)
         head = self._file.read(HEAD.size)
         if len(head) < HEAD.size:
@@ -251,7 +252,8 @@ class _Scanner:
         return end == footer(place + HEAD.size, body)
 
     def _is_damage(self, place: int) -> bool:
-        """Whether what is at ``place``, behind which nothing is intact, is no message cut short."""
+        """Tell whether the bytes at ``place``, behind which nothing is intact, are no message cut
+        short."""
         if self._sealed and any(self._ends_closed(place, size) for size in _CLOSING_SIZES):
             return True
         self._file.seek(place)
@@ -265,7 +267,8 @@ class _Scanner:
         return bool(kind > _LAST_KIND or end <= self._size)
 
     def _ends_closed(self, place: int, size: int) -> bool:
-        """Whether the last ``size`` bytes, those after a seal behind ``place``, close the file.
+        """Tell whether the last ``size`` bytes, those after a seal behind ``place``, close the
+        file.
 
         A closing message without an index is sixteen zeros, which stand inside of messages too, as
         in many seals. It closes the file only where it follows a seal.
@@ -277,7 +280,7 @@ class _Scanner:
         return tail.startswith(_MARK) and tail.endswith(_CLOSING_SIZES[size])
 
     def _next_after(self, place: int) -> int | None:
-        """The place of the next intact message: behind a seal that stands behind ``place``."""
+        """Find the next intact message: behind a seal that stands behind ``place``."""
         if not self._sealed:
             return None
         at = place
@@ -296,7 +299,7 @@ class _Scanner:
 
 
 def _checked(place: int, head: bytes, body: bytes, known: int) -> FileMessage | None:
-    """The message, if its seal is right."""
+    """Return the message, if its seal is right."""
     if body[-SEAL_SIZE : -_SEAL.size] != _MARK:
         return None
     number, content, first, last, _, crc = _SEAL.unpack_from(body, len(body) - _SEAL.size)
@@ -307,7 +310,7 @@ def _checked(place: int, head: bytes, body: bytes, known: int) -> FileMessage | 
 
 
 def _named(damage: Damage, found: list[FileMessage]) -> Damage:
-    """The damage with the ticks around it."""
+    """Return the damage with the ticks around it."""
     rows = [m for m in found if m.content is Content.ROWS]
     after = max((m.last for m in rows if m.place < damage.begin), default=None)
     before = min((m.first for m in rows if m.place >= damage.end), default=None)
@@ -315,7 +318,7 @@ def _named(damage: Damage, found: list[FileMessage]) -> Damage:
 
 
 def body_of(file: BinaryIO, message: FileMessage) -> bytes:
-    """The body of a message, read and verified once more.
+    """Read the body of a message and verify it once more.
 
     Raises:
         ValueError: it has changed since the file was looked through.
@@ -333,7 +336,7 @@ def body_of(file: BinaryIO, message: FileMessage) -> bytes:
 
 
 def renumbered(file: BinaryIO, message: FileMessage, number: int) -> bytes:
-    """A sealed message with another number. Raises ``ValueError`` as ``body_of`` does."""
+    """Return a sealed message with another number. Raises ``ValueError`` as ``body_of`` does."""
     file.seek(0)
     known = crc32(file.read(FILE_HEAD)) if number == 0 else 0
     body = body_of(file, message)[:-SEAL_SIZE]
@@ -342,7 +345,7 @@ def renumbered(file: BinaryIO, message: FileMessage, number: int) -> bytes:
 
 
 def index_of(file: BinaryIO, found: Scan) -> bytes:
-    """The index of a closed file, without its seal; empty if it has none."""
+    """Read the index of a closed file, without its seal; empty if it has none."""
     file.seek(found.end)
     head = file.read(HEAD.size)
     if not (found.sealed and found.closed) or head == CLOSING:
@@ -351,7 +354,7 @@ def index_of(file: BinaryIO, found: Scan) -> bytes:
 
 
 def table_of(body: bytes) -> tuple[str, Any]:
-    """Entity and Arrow record batch that a message of kind ``ARROW`` holds.
+    """Read entity and Arrow record batch that a message of kind ``ARROW`` holds.
 
     Raises:
         ValueError: it is not what Rerun writes.
@@ -374,7 +377,7 @@ def table_of(body: bytes) -> tuple[str, Any]:
 
 
 def is_static(batch: Any) -> bool:
-    """Whether a table has no timelines."""
+    """Tell whether a table has no timelines."""
     return not any((f.metadata or {}).get(b"rerun:kind") == b"index" for f in batch.schema)
 
 
@@ -419,7 +422,8 @@ def expect_intact(found: Scan) -> None:
 def tables(
     found: Scan, content: Content, entity: str, *, static: bool = False
 ) -> Iterator[tuple[str, Any]]:
-    """Entity and Arrow record batch of all tables of an entity, or of those below ``entity/**``.
+    """Yield entity and Arrow record batch of all tables of an entity, or of those below
+    ``entity/**``.
 
     Raises:
         RecordingError: a message holds something else than Rerun writes.
@@ -431,7 +435,7 @@ def tables(
 
 
 def located(found: Scan, content: Content) -> Iterator[tuple[FileMessage, str, Any]]:
-    """Message, entity and record batch of all messages with that content."""
+    """Yield message, entity and record batch of all messages with that content."""
     with found.path.open("rb") as file:
         for message in found.of(content):
             try:
@@ -442,14 +446,14 @@ def located(found: Scan, content: Content) -> Iterator[tuple[FileMessage, str, A
 
 
 def unreadable(found: Scan, message: FileMessage, error: Exception) -> RecordingError:
-    """The error for a message that cannot be taken apart."""
+    """Make the error for a message that cannot be taken apart."""
     return RecordingError(
         f"{found.path} cannot be read at byte {message.place} ({error}); the file is damaged there"
     )
 
 
 def tables_at(found: Scan, message: FileMessage) -> tuple[str, Any]:
-    """Entity and record batch of one message. Raises ``RecordingError``."""
+    """Read entity and record batch of one message. Raises ``RecordingError``."""
     assert message.kind == ARROW
     with found.path.open("rb") as file:
         try:
@@ -459,7 +463,7 @@ def tables_at(found: Scan, message: FileMessage) -> tuple[str, Any]:
 
 
 def all_tables(path: Path, entity: str, *, static: bool = False) -> Iterator[tuple[str, Any]]:
-    """Entity and record batch of all tables of an entity of any Rerun file; see ``tables``."""
+    """Yield entity and record batch of all tables of an entity of any Rerun file; see ``tables``."""
     found = scanned(path)
     for message in found.messages:
         if message.kind == ARROW:

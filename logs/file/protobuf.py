@@ -10,7 +10,7 @@ _NUMBER, _EIGHT_BYTES, _BYTES, _FOUR_BYTES = 0, 1, 2, 5
 
 
 def fields(body: bytes) -> Iterator[tuple[int, Any]]:
-    """Number and value of every field of a message.
+    """Yield number and value of every field of a message.
 
     Raises:
         IndexError: it is no message.
@@ -35,14 +35,14 @@ def fields(body: bytes) -> Iterator[tuple[int, Any]]:
 
 
 def field(number: int, value: int | bytes) -> bytes:
-    """A field of a message."""
+    """Encode a field of a message."""
     if isinstance(value, int):
         return _encoded(number << 3 | _NUMBER) + _encoded(value)
     return _encoded(number << 3 | _BYTES) + _encoded(len(value)) + value
 
 
 def _number(body: bytes, place: int) -> tuple[int, int]:
-    """A whole number of variable length, and the place behind it."""
+    """Read a whole number of variable length; return it and the place behind it."""
     value = 0
     for shift in range(0, 64, 7):
         byte = body[place]
@@ -54,7 +54,7 @@ def _number(body: bytes, place: int) -> tuple[int, int]:
 
 
 def _encoded(value: int) -> bytes:
-    """A whole number in its variable length."""
+    """Encode a whole number in its variable length."""
     data = bytearray()
     while value > 127:
         data.append(value & 127 | 128)

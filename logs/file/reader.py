@@ -84,13 +84,13 @@ class PackedRows:
         self._lasts = [piece.last for piece in self._pieces]
 
     def _sealed(self) -> Iterator[_PackedPiece]:
-        """The pieces of a file with seals, which say what is in each message."""
+        """Yield the pieces of a file with seals, which say what is in each message."""
         for message in self._found.of(Content.ROWS):
             yield _PackedPiece(message, 0, message.first, message.last)
 
     def _without_seals(self) -> Iterator[_PackedPiece]:
-        """The pieces of a file that another program has written again, which may have put several
-        into one message."""
+        """Yield the pieces of a file that another program has written again, which may have put
+        several into one message."""
         for message, name, batch in located(self._found, Content.ROWS):
             if name == f"/{ROWS}":
                 for row in range(len(batch)):
@@ -100,7 +100,7 @@ class PackedRows:
     def _unpacked(
         self, message: FileMessage, batch: Any, row: int, part: tuple[int, int] | None = None
     ) -> tuple[int, NDArray[np.uint8]]:
-        """First tick and rows (n, bytes) of a piece, or of each row the bytes ``part`` only."""
+        """Unpack first tick and rows (n, bytes) of a piece, or of each row the bytes ``part`` only."""
         try:
             packed = batch[f"aloft:{PACKED}"][row].values.to_numpy().tobytes()
             first, rows = unpack(packed) if part is None else unpack_bytes(packed, *part)
@@ -117,7 +117,7 @@ class PackedRows:
         return np.unique(np.concatenate([np.zeros(0, np.int64), *found]))
 
     def pieces(self, first: int, last: int) -> Iterator[TickRows]:
-        """The ticks from ``first`` up to, without, ``last``, and their rows, some at a time."""
+        """Yield the ticks from ``first`` up to, without, ``last``, and their rows, some at a time."""
         begin = bisect_left(self._lasts, first)
         for piece in self._pieces[begin:]:
             if piece.first >= last:
@@ -129,16 +129,16 @@ class PackedRows:
             yield ticks[low:high], rows[low:high]
 
     def rows(self) -> NDArray[np.uint8]:
-        """The rows of all ticks, (ticks, bytes), unpacked by several threads."""
+        """Unpack the rows of all ticks, (ticks, bytes), in several threads."""
         return self._all()
 
     def signal(self, field: RecordedField) -> NDArray[Any]:
-        """One field at every tick, (ticks, ...), unpacked by several threads."""
+        """Read one field at every tick, (ticks, ...), unpacked by several threads."""
         found = self._all(self._header.bus.layout().byte_range(field.name))
         return found.view(field.dtype).reshape(len(found), *field.shape)
 
     def _all(self, part: tuple[int, int] | None = None) -> NDArray[np.uint8]:
-        """The rows of all ticks, (ticks, bytes), or of each row the bytes ``part`` only."""
+        """Unpack the rows of all ticks, (ticks, bytes), or of each row the bytes ``part`` only."""
         ticks = self.ticks
         size = self._header.bus.size if part is None else part[1] - part[0]
         rows = np.empty((len(ticks), size), np.uint8)
@@ -191,7 +191,7 @@ class RecordedRun:
 
     @property
     def whole(self) -> bool:
-        """Whether the run's outcome is there, the file was closed, and every checksum is right."""
+        """True if the run's outcome is there, the file was closed, and every checksum is right."""
         return self.outcome is not None and self.scan.closed and not self.scan.damage
 
     @cached_property
@@ -199,12 +199,12 @@ class RecordedRun:
         return PackedRows(self.scan, self.header)
 
     def signals(self) -> Mapping[str, RecordedField]:
-        """Every recorded signal by ``block.port.field``, with unit, frame, shape and text."""
+        """Return every recorded signal by ``block.port.field``, with unit, frame, shape and text."""
         return {field.name: field for field in self.header.bus.fields if not field.constant}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """One signal at every recorded tick, (ticks, ...), in its own dtype. A port of one field
-        may stand for its field, as in wires.
+        """Return one signal at every recorded tick, (ticks, ...), in its own dtype. A port of one
+        field may stand for its field, as in wires.
 
         Raises:
             KeyError: there is no such signal; the message has the nearest names.
@@ -220,7 +220,7 @@ class RecordedRun:
 
     @cached_property
     def _asked(self) -> set[str]:
-        """The signals that were asked for; nothing depends on their order."""
+        """The requested signals; nothing depends on their order."""
         return set()
 
     def nearest(self, name: str) -> NoReturn:
@@ -229,8 +229,8 @@ class RecordedRun:
         raise KeyError(f"no signal {name!r}; the nearest are {', '.join(near)}")
 
     def to_pandas(self, *names: str) -> Any:
-        """Some signals, by default all, as a pandas ``DataFrame``: one column a number, called
-        ``block.port.field[i]``, by time [s]. Raises ``ImportError`` without pandas."""
+        """Return some signals, by default all, as a pandas ``DataFrame``: one column a number,
+        called ``block.port.field[i]``, by time [s]. Raises ``ImportError`` without pandas."""
         import pandas
 
         from .table import TIME, flat_columns
@@ -238,7 +238,7 @@ class RecordedRun:
         return pandas.DataFrame(flat_columns(self, names)).set_index(TIME)
 
     def to_polars(self, *names: str) -> Any:
-        """The same columns as a polars ``DataFrame``. Raises ``ImportError`` without polars."""
+        """Return the same columns as a polars ``DataFrame``. Raises ``ImportError`` without polars."""
         import polars
 
         from .table import flat_columns
@@ -264,8 +264,8 @@ class RecordedRun:
         return self._source.rows()
 
     def pieces(self, first: int | None = None, last: int | None = None) -> Iterator[TickRows]:
-        """Ticks (n,) and rows (n, bytes) from tick ``first`` up to, without, ``last``, some hundred at
-        a time and each read from the file when it is asked for."""
+        """Yield ticks (n,) and rows (n, bytes) from tick ``first`` up to, without, ``last``, some
+        hundred at a time and each read from the file when it is asked for."""
         ticks = self.ticks
         if not len(ticks):
             return iter(())
@@ -273,7 +273,8 @@ class RecordedRun:
         return self._source.pieces(low, int(ticks[-1]) + 1 if last is None else last)
 
     def batches(self, least: int = 1) -> Iterator[RecordedRows]:
-        """All ticks in order, at least ``least`` at a time but for the last batch; none is kept."""
+        """Yield all ticks in order, at least ``least`` at a time but for the last batch; none is
+        kept."""
         waiting: list[TickRows] = []
         for piece in self.pieces():
             waiting.append(piece)
@@ -284,7 +285,7 @@ class RecordedRun:
             yield self._batch(waiting)
 
     def no_rows(self) -> RecordedRows:
-        """A batch without ticks."""
+        """Return a batch without ticks."""
         return self._batch([(np.zeros(0, np.int64), np.zeros((0, self.header.bus.size), np.uint8))])
 
     def _batch(self, pieces: list[TickRows]) -> RecordedRows:
@@ -293,7 +294,8 @@ class RecordedRun:
         return RecordedRows(self.header, np.concatenate(ticks), np.concatenate(rows), layout)
 
     def window(self, first: int, last: int) -> TickRows:
-        """The ticks from ``first`` up to, without, ``last``, (n,), and their rows, (n, bytes)."""
+        """Return the ticks from ``first`` up to, without, ``last``, (n,), and their rows, (n,
+        bytes)."""
         found = list(self.pieces(first, last))
         if not found:
             return np.zeros(0, np.int64), np.zeros((0, self.header.bus.size), np.uint8)
@@ -316,7 +318,7 @@ class RecordedRun:
         return tuple(self._snapshots)
 
     def snapshot(self, tick: int) -> Snapshot:
-        """The keyframe at ``tick``, for ``BoundGraph.restore``.
+        """Return the keyframe at ``tick``, for ``BoundGraph.restore``.
 
         Raises:
             KeyError: there is no keyframe at that tick.
@@ -393,7 +395,7 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
 
 
 def _properties(found: Scan) -> dict[str, str]:
-    """The texts under ``__properties``, by name."""
+    """Return the texts under ``__properties``, by name."""
     texts = {}
     contents = (Content.START, Content.OUTCOME) if found.sealed else (Content.UNKNOWN,)
     for content in contents:

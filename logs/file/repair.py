@@ -1,4 +1,4 @@
-"""Repairs a recording in place: what is not intact is taken out, and the file is closed.
+"""Repairs a recording in place: removes messages that are not intact, and closes the file.
 
 Nothing of this needs room on the disk, except the sixteen bytes that close the file. What stands
 behind damage is moved forward, message by message. A file that had an index has one afterwards; one
@@ -35,7 +35,7 @@ class RepairError(AloftError):
 
 @dataclass(frozen=True)
 class Repair:
-    """What was found and done.
+    """The findings and the result of a repair.
 
     Attributes:
         path: the file.
@@ -59,7 +59,7 @@ class Repair:
 
     @property
     def was_whole(self) -> bool:
-        """Whether there was nothing to repair."""
+        """True if there was nothing to repair."""
         return self.closed and not self.damage
 
 

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 Words = NDArray[np.int64]
 
 ORDER = 2
-"""Of the differences over time."""
+"""Order of the differences over time."""
 LEVEL = 3
-"""Of Zstandard; higher levels save 1 % at three times the work."""
+"""Level of Zstandard; higher ones save 1 % at three times the work."""
 _HEAD = Struct("<4sIIqI")
 """A mark, the number of ticks, the bytes of a row, the first tick, and the CRC-32 of the rows."""
 _MARK = b"rowp"
@@ -32,7 +32,7 @@ _SIZES = Struct("<II")
 
 
 def pack(first: int, rows: NDArray[np.uint8]) -> bytes:
-    """The packed ``rows`` (n, bytes) of the ``n`` ticks from ``first`` on."""
+    """Pack the ``rows`` (n, bytes) of the ``n`` ticks from ``first`` on."""
     import pyarrow as pa  # comes with Rerun
 
     count, size = rows.shape
@@ -56,7 +56,7 @@ def pack(first: int, rows: NDArray[np.uint8]) -> bytes:
 
 
 def unpack(data: bytes) -> tuple[int, NDArray[np.uint8]]:
-    """The first tick and the rows (n, bytes).
+    """Unpack the first tick and the rows (n, bytes).
 
     Raises:
         ValueError: the bytes are not packed rows, or give other rows than were packed.
@@ -70,7 +70,8 @@ def unpack(data: bytes) -> tuple[int, NDArray[np.uint8]]:
 
 
 def unpack_bytes(data: bytes, begin: int, end: int) -> tuple[int, NDArray[np.uint8]]:
-    """The first tick and the bytes from ``begin`` up to, without, ``end`` of each row, (n, bytes).
+    """Unpack the first tick and the bytes from ``begin`` up to, without, ``end`` of each row, (n,
+    bytes).
 
     Raises:
         ValueError: the bytes are not packed rows.
@@ -81,7 +82,7 @@ def unpack_bytes(data: bytes, begin: int, end: int) -> tuple[int, NDArray[np.uin
 
 
 def _head(data: bytes) -> tuple[bytes, int, int, int, int]:
-    """Mark, number of ticks, bytes of a row, first tick, CRC-32. Raises ``ValueError``."""
+    """Read mark, number of ticks, bytes of a row, first tick, CRC-32. Raises ``ValueError``."""
     if len(data) < _HEAD.size + _SIZES.size or data[:4] != _MARK:
         raise ValueError("these bytes are no packed rows")
     mark, count, size, first, crc = _HEAD.unpack_from(data)
@@ -99,7 +100,8 @@ def _decompressed(packed: bytes, size: int) -> bytes:
 
 
 def _words(data: bytes, begin: int, end: int) -> NDArray[np.uint8]:
-    """The words of each row that have the bytes from ``begin`` to ``end``, as bytes, (n, bytes)."""
+    """Unpack the words of each row that have the bytes from ``begin`` to ``end``, as bytes, (n,
+    bytes)."""
     _, count, size, _, _ = _head(data)
     changes, length = _SIZES.unpack_from(data, _HEAD.size)
     flat = _decompressed(data[_HEAD.size + _SIZES.size :], length)
@@ -126,7 +128,7 @@ def _words(data: bytes, begin: int, end: int) -> NDArray[np.uint8]:
 
 
 def _columns(planes: NDArray[np.uint8]) -> Words:
-    """The columns (n, ticks) from their bytes (8, n, ticks)."""
+    """Join the columns (n, ticks) from their bytes (8, n, ticks)."""
     zigzag = np.ascontiguousarray(planes.transpose(1, 2, 0)).view(np.uint64)[:, :, 0]
     signs = -(zigzag & np.uint64(1)).view(np.int64)
     columns: Words = (zigzag >> np.uint64(1)).view(np.int64) ^ signs

@@ -15,7 +15,7 @@ TICK, TIME = "tick", "t"
 
 
 class SignalSource(Protocol):
-    """What the tables need of a recording that is read."""
+    """The part of a read recording that tables need."""
 
     @property
     def ticks(self) -> NDArray[np.int64]:
@@ -30,17 +30,17 @@ class SignalSource(Protocol):
         """All signals' bytes at every tick, (ticks, bytes)."""
 
     def signals(self) -> Mapping[str, RecordedField]:
-        """The recorded signals by name."""
+        """Return the recorded signals by name."""
 
     def nearest(self, name: str) -> NoReturn:
         """Raise the ``KeyError`` that names the signals nearest to a wrong name."""
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """One signal at every tick, (ticks, ...)."""
+        """Return one signal at every tick, (ticks, ...)."""
 
 
 def flat_columns(run: SignalSource, names: Sequence[str] = ()) -> dict[str, NDArray[Any]]:
-    """``tick``, ``t`` and every number of some signals, by default of all, each (ticks,).
+    """Return ``tick``, ``t`` and every number of some signals, by default of all, each (ticks,).
 
     Args:
         run: the recording.
@@ -61,7 +61,7 @@ def flat_columns(run: SignalSource, names: Sequence[str] = ()) -> dict[str, NDAr
 
 
 def chosen(run: SignalSource, names: Sequence[str]) -> list[RecordedField]:
-    """The signals that ``names`` mean, in the order of the file; all of them without names.
+    """Return the signals that ``names`` mean, in the order of the file; all of them without names.
 
     Raises:
         KeyError: no signal has such a name or beginning.
@@ -80,12 +80,12 @@ def _means(name: str, signal: str) -> bool:
 
 
 def column_name(field: RecordedField, place: Sequence[int]) -> str:
-    """The name of the column of one number of a field."""
+    """Return the name of the column of one number of a field."""
     return f"{field.name}[{', '.join(map(str, place))}]" if len(place) else field.name
 
 
 def units(run: SignalSource, names: Sequence[str] = ()) -> Mapping[str, str]:
-    """The unit of every column that has one, as text."""
+    """Return the unit of every column that has one, as text."""
     found = {TIME: "s"}
     for field in chosen(run, names):
         if field.unit is not None:

@@ -1,1 +1,1 @@
-"""Records a run while it goes on, or when it is over."""
+"""Recording of a run while it goes on, or after its end."""

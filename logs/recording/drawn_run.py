@@ -93,7 +93,7 @@ def write_comparison(path: str | PathLike[str], first: RecordedRun, second: Reco
 
 
 def _labels(first: RecordedRun, second: RecordedRun) -> tuple[str, str]:
-    """The names of the runs: those of their files, with the folders if these are equal."""
+    """Return the names of the runs: those of their files, with the folders if these are equal."""
     one, two = first.path.stem, second.path.stem
     if one != two:
         return one, two
@@ -102,6 +102,6 @@ def _labels(first: RecordedRun, second: RecordedRun) -> tuple[str, str]:
 
 
 def _roots(name: str, other: str) -> tuple[str, str]:
-    """The labels as names of entities."""
+    """Return the labels as names of entities."""
     one, two = (re.sub(r"[^A-Za-z0-9_-]+", "_", label) for label in (name, other))
     return (one, two) if one != two else (f"first_{one}", f"second_{two}")

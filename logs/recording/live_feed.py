@@ -120,7 +120,7 @@ class LiveFeed:
 
 
 def _has_taken(stream: Any) -> bool:
-    """Whether the viewer takes what it was sent within a second.
+    """Tell whether the viewer takes its data within a second.
 
     Sending does not fail when the viewer has gone, so only a flush can tell.
 
@@ -162,7 +162,7 @@ class WatchedPart:
 
     @property
     def problem(self) -> str:
-        """Why nothing is shown any more; empty while all is well."""
+        """The reason why nothing is shown any more; empty while the viewer works."""
         return self._feed.problem
 
     def close(self) -> None:

@@ -30,11 +30,11 @@ from .writer import RecordingWriter
 _OF_ALL = ("life", "parameter")
 """The kinds of notes that every part has; one of them is enough."""
 _STAND_IN = f"{LinkInput.__module__}:{LinkInput.__name__}"
-"""What the types of those blocks contain that only stand for a block of another machine."""
+"""Part of the type names of those blocks that only stand for a block of another machine."""
 
 
 def machine_of(placed: PlacedGraph, part: RecordedRun) -> str:
-    """The machine whose part a recording is of.
+    """Find the machine whose part a recording is of.
 
     Raises:
         AloftError: it is no recording of a part of this graph.
@@ -50,7 +50,7 @@ def machine_of(placed: PlacedGraph, part: RecordedRun) -> str:
 def merged_outcome(
     placed: PlacedGraph, parts: Mapping[str, RecordedRun], run_hash: str, ticks: int
 ) -> dict[str, Any]:
-    """The outcome of the whole run, from those of its parts.
+    """Join the outcome of the whole run from those of its parts.
 
     The reason is that of the part with the gravest exit code. Metrics are those of all parts; where
     two have one of the same name, that of the first machine counts.
@@ -83,8 +83,8 @@ def merged_outcome(
 
 
 def path_metrics(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> dict[str, Any]:
-    """The measured ages of the paths for which the graph allows one, where parts ran free; in
-    lockstep the part that sets the pace has measured them."""
+    """Return the measured ages of the paths for which the graph allows one, where parts ran free;
+    in lockstep the part that sets the pace has measured them."""
     graph = placed.graph
     if graph.links.mode != "free" or not graph.links.paths:
         return {}
@@ -97,7 +97,7 @@ def path_metrics(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> dict[
 
 
 def _latest(part: RecordedRun) -> tuple[int, int]:
-    """The ticks of a part that are looked at: the first, and the one after the last."""
+    """Return the ticks of a part that are compared: the first, and the one after the last."""
     if not len(part.ticks):
         return 0, 0
     end = int(part.ticks[-1]) + 1
@@ -107,7 +107,7 @@ def _latest(part: RecordedRun) -> tuple[int, int]:
 def read_parts(
     placed: PlacedGraph, paths: Mapping[str, str | PathLike[str]]
 ) -> dict[str, RecordedRun]:
-    """The recordings of all parts of a graph, by machine.
+    """Read the recordings of all parts of a graph, by machine.
 
     Raises:
         AloftError: a part is missing, is no recording, or is of another graph.
@@ -126,13 +126,13 @@ def read_parts(
 
 
 def _whole_bus(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> MergedLayout:
-    """What takes the bus of the whole from those of the parts, which may hold more."""
+    """Return a layout that takes the bus of the whole from those of the parts, which may hold more."""
     layout = Memory(placed.graph.blocks, placed.graph.robot).bus.layout
     return MergedLayout(placed, layout, {m: part.header.bus.layout() for m, part in parts.items()})
 
 
 def run_hash_of(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> tuple[str, int]:
-    """The run hash of the whole, as one process would have it, and the number of its ticks."""
+    """Compute the run hash of the whole, as one process would have it, and the number of its ticks."""
     made = blake2b(digest_size=16)
     count = 0
     for _, rows in _pieces(placed, parts):
@@ -180,7 +180,7 @@ def merge_recordings(
 
 
 def _pieces(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> Any:
-    """Ticks (n,) and rows (n, bytes) of the whole, some hundred at a time."""
+    """Yield ticks (n,) and rows (n, bytes) of the whole, some hundred at a time."""
     whole = _whole_bus(placed, parts)
     first, *others = (part.ticks for part in parts.values())
     common = first
@@ -198,7 +198,7 @@ def _pieces(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> Any:
 def _keyframes(
     placed: PlacedGraph, bound: BoundGraph, parts: Mapping[str, RecordedRun]
 ) -> Sequence[Snapshot]:
-    """The keyframes of the whole, before those ticks for which every part has one."""
+    """Join the keyframes of the whole, before those ticks for which every part has one."""
     bus = _whole_bus(placed, parts)
     state = MergedLayout(
         placed, bound.memory.state.layout, {m: p.header.state.layout() for m, p in parts.items()}
@@ -215,7 +215,7 @@ def _keyframes(
 
 
 def _notes(parts: Mapping[str, RecordedRun]) -> list[Note]:
-    """The notes of all parts; those that every part has are taken from the first."""
+    """Join the notes of all parts; those that every part has are taken from the first."""
     found: list[Note] = []
     for number, (machine, part) in enumerate(parts.items()):
         for note in part.notes:

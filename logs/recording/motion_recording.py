@@ -80,12 +80,12 @@ def write_motion(path: str | Path, motion: MotionRecording, name: str) -> Path:
 
 
 def series_entity(title: str) -> str:
-    """The entity of a series: ``foot height [m]`` is in ``series/foot_height``."""
+    """Return the entity of a series: ``foot height [m]`` is in ``series/foot_height``."""
     return f"series/{title.partition(' [')[0].replace(' ', '_')}"
 
 
 def motion_blueprint(motion: MotionRecording) -> Any:
-    """The robot on the left, every series on the right."""
+    """Lay out the robot on the left, every series on the right."""
     import rerun.blueprint as rrb
 
     scene = rrb.Spatial3DView(
@@ -112,7 +112,7 @@ def _times(time: Array) -> list[Any]:
 
 
 def _write_world(stream: Any, motion: MotionRecording) -> None:
-    """The links, the forces and the centre of mass."""
+    """Write the links, the forces and the centre of mass."""
     import rerun as rr
 
     robot, times = motion.robot, _times(motion.time)

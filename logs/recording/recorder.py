@@ -28,7 +28,7 @@ from ...runtime.running.run_result import RunResult
 from ...runtime.running.sinks import Note, parameter_note
 from ..file.header import header_of
 from ..file.reader import read
-from .place import cause_of, part_of, remedy, replaced, take_place
+from .output_file import cause_of, remedy, replaced, reserve_output, unfinished_name
 from .recorder_link import RecorderLink, rerun_is_installed
 from .recorder_protocol import KEYFRAME, NOTE, REWIND, ROW, RecorderReport, RecorderTask
 from .ring import space_of
@@ -49,7 +49,7 @@ class Recorder:
     Args:
         path: the file; its folder is made. ``None`` writes none and only shows the run live. If
             another run is being recorded there, this one takes another name, with a warning.
-        keep: how many earlier recordings of that name are kept; see ``place``.
+        keep: how many earlier recordings of that name are kept; see ``output_file``.
         when_full: what to do when the process cannot keep up: ``wait``, which costs a simulation in
             virtual time nothing but a while, or ``drop`` ticks, which are counted. By default what
             suits the graph's clock: a run in real time never waits.
@@ -173,19 +173,19 @@ class Recorder:
         capacity = round(self._ring_time * rate) * space_of(len(self._bus)) + frame
         header = header_of(self._bound).to_json()
         try:
-            place = None
+            output = None
             if self.path is not None:
-                place = take_place(self.path, self._keep)
-                self.path = place.target
+                output = reserve_output(self.path, self._keep)
+                self.path = output.target
                 self.before = replaced(self.path, self._keep)
-                for text in place.said:
+                for text in output.said:
                     self._warn(text)
             path = str(self.path.absolute()) if self.path is not None else ""
             task = RecorderTask(
                 capacity, path, self._keep, *self._periods, self._live, round(self._split * rate)
             )
             link = self._started or RecorderLink()
-            link.begin(task, place, header, least=frame)
+            link.begin(task, output, header, least=frame)
             self.link = link
         except OSError as error:
             what = f"{self.path} cannot be written" if self.path else "the recorder cannot start"
@@ -231,7 +231,7 @@ class Recorder:
         return False
 
     def _waiting_helps(self) -> bool:
-        """Whether to go on waiting for the process. It warns once that the process is slow."""
+        """Tell whether to go on waiting for the process. It warns once that the process is slow."""
         assert self.link is not None
         stalled = self.link.stalled_for()
         if not self.link.is_alive() or stalled > GIVE_UP_TIME:
@@ -352,7 +352,8 @@ class Recorder:
         )
 
     def _ticks_found(self, path: Path) -> tuple[int, Path]:
-        """The ticks in the files that the process left, and the name of the last of them."""
+        """Count the ticks in the files that the process left, and return the name of the last of
+        them."""
         count = 0
         while self._split:
             try:
@@ -364,12 +365,12 @@ class Recorder:
                 break
             count, path = count + len(closed.ticks), path.with_name(following)
         with suppress(AloftError, OSError):
-            count += len(read(part_of(path), damaged=True).ticks)
-        return count, part_of(path)
+            count += len(read(unfinished_name(path), damaged=True).ticks)
+        return count, unfinished_name(path)
 
 
 def _no_room(kind: int, tick: int, data: memoryview | bytes | bytearray) -> bool:
-    """Stands for the ring of a recorder that is given up."""
+    """Stand in for the ring of a recorder that is given up."""
     return False
 
 

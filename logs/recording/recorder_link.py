@@ -14,7 +14,7 @@ from select import select
 from typing import Any
 
 from ...processes.child_process import ChildProcess
-from .place import RecordingPlace
+from .output_file import OutputFile
 from .recorder_protocol import HEADER, RecorderReport, RecorderTask
 from .ring import RingWriter, fitting_capacity, make_memory, space_of
 
@@ -25,12 +25,13 @@ ENDING = 10.0
 
 
 def rerun_is_installed() -> bool:
-    """Whether the process will find Rerun."""
+    """Tell whether the process will find Rerun."""
     return find_spec("rerun") is not None
 
 
 def start_early() -> RecorderLink | None:
-    """The process for a run that will be recorded; ``None`` where the recorder will say why not."""
+    """Start the process for a run that will be recorded; ``None`` where the recorder will say why
+    not."""
     with suppress(OSError):
         return RecorderLink() if rerun_is_installed() else None
     return None
@@ -72,13 +73,13 @@ class RecorderLink:
         self._seen, self._since = (0, 0), time.monotonic()
 
     def begin(
-        self, task: RecorderTask, place: RecordingPlace | None, header: str, least: int = 1 << 16
+        self, task: RecorderTask, output: OutputFile | None, header: str, least: int = 1 << 16
     ) -> None:
         """Tell the process what to record.
 
         Args:
             task: with the least capacity of the ring [bytes], and without descriptors.
-            place: the file's place, if there is to be a file. The process takes it over.
+            output: the file, locked, if there is to be a file. The process takes it over.
             header: of the recording, as text.
             least: the size with which the ring makes do where files may not be larger.
 
@@ -94,18 +95,18 @@ class RecorderLink:
             self.ring = RingWriter(descriptor, capacity)
             self.ring.write(HEADER, 0, text)
             message = json.dumps(asdict(replace(task, capacity=capacity))).encode()
-            handed = [descriptor, *([place.descriptor] if place is not None else [])]
+            handed = [descriptor, *([output.descriptor] if output is not None else [])]
             socket.send_fds(self._tasks, [message], handed)
         except BaseException:
-            if place is not None:
-                place.discard()
+            if output is not None:
+                output.discard()
             raise
         finally:
             self._tasks.close()
             if descriptor >= 0:
                 os.close(descriptor)
-            if place is not None:
-                place.close()  # the process holds the file and its lock
+            if output is not None:
+                output.close()  # the process holds the file and its lock
 
     def close(self) -> None:
         """End the process if it was not told what to record."""
@@ -119,11 +120,12 @@ class RecorderLink:
         return self._process.pid
 
     def is_alive(self) -> bool:
-        """Whether the process is running."""
+        """Tell whether the process is running."""
         return self._process.is_alive()
 
     def stalled_for(self) -> float:
-        """The seconds since the process last made progress, or since ``reset_stall_timer`` was called.
+        """Return the seconds since the process last made progress, or since ``reset_stall_timer``
+        was called.
 
         It makes progress when it takes something out of the ring, and, where the system tells,
         when it reads or writes a file, as it does while it starts and while it ends.
@@ -134,7 +136,8 @@ class RecorderLink:
         return time.monotonic() - self._since
 
     def _bytes_moved(self) -> int:
-        """The bytes that the process has read and written so far; zero where nothing tells it."""
+        """Return the bytes that the process has read and written so far; zero where nothing tells
+        it."""
         try:
             with open(f"/proc/{self.process_id}/io", encoding="ascii") as file:
                 return sum(int(line.split()[1]) for line in file if line[1:5] == "char")

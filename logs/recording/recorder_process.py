@@ -30,7 +30,7 @@ from ...runtime.running.failures import describe
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.sinks import Note
 from ..file.format import Header
-from .place import RecordingPlace, cause_of, split_name, take_place
+from .output_file import OutputFile, cause_of, reserve_output, split_name
 from .recorder_protocol import KEYFRAME, NOTE, REWIND, ROW, RecorderReport, RecorderTask
 from .ring import Record, RingReader
 from .writer import RecordingWriter
@@ -47,7 +47,8 @@ LAST_SYNC = 2.0
 BATCH, BATCH_BYTES = 1024, 1 << 24
 """Ticks written at once, and their bytes, at most."""
 SLOW_FLUSH = 4.0
-"""How many flush periods ticks may wait that are fewer than those of one period of the graph."""
+"""Number of flush periods for which ticks may wait that are fewer than those of one period of the
+graph."""
 DRAW_PERIOD = 10.0
 """Seconds between two pieces of what the viewer shows: each costs the viewer time and memory."""
 
@@ -77,17 +78,17 @@ class RecorderProcess:
         self._files: list[str] = []
         self._writer: RecordingWriter | None = None
         self._failed: RecordingWriter | None = None
-        self._place: RecordingPlace | None = None
+        self._output: OutputFile | None = None
         if file is not None:
-            self._place = RecordingPlace(Path(task.path), file, task.keep)
+            self._output = OutputFile(Path(task.path), file, task.keep)
             self._guard(lambda: self._open(header))
         self.feed = _live_feed(task.live, header) if task.live else None
         self._fed_rows = self._rewinds = 0
         self._flushed = self._synced = self._drawn = self._fed = time.monotonic()
 
     def _open(self, header: Header) -> None:
-        assert self._place is not None
-        self._writer = RecordingWriter(self._place.target, header, place=self._place)
+        assert self._output is not None
+        self._writer = RecordingWriter(self._output.target, header, output=self._output)
 
     def _go_back(self, tick: int) -> None:
         """Go on with ``tick``, which has been run before, in a new file and as a new run of the viewer."""
@@ -103,8 +104,8 @@ class RecorderProcess:
 
     def _split(self, tick: int, *, back: bool = False) -> None:
         """Close the file, and go on in a new one with the tick ``tick``, or ``back`` with it."""
-        writer, place = self._writer, self._place
-        if writer is None or place is None:
+        writer, output = self._writer, self._output
+        if writer is None or output is None:
             return
         following = split_name(Path(self._task.path), len(self._files) + 2)
         self._write_batch()
@@ -115,21 +116,21 @@ class RecorderProcess:
         self._guard(self._close)
         if self.report.problem:
             return
-        self._files.append(str(place.target))
+        self._files.append(str(output.target))
         self._rows_before += writer.recorded
-        self._size_before += place.target.stat().st_size
+        self._size_before += output.target.stat().st_size
         self._writer = None
         self._header = replace(self._header, first_tick=tick, run_begin=self._begun_at())
         self._guard(lambda: self._open_following(following))
         self._notes = list(self._changes)
 
     def _begun_at(self) -> int:
-        """The first tick of the run."""
+        """Return the first tick of the run."""
         header = self._header
         return header.first_tick if header.run_begin is None else header.run_begin
 
     def _open_following(self, path: Path) -> None:
-        self._place = take_place(path, self._task.keep)
+        self._output = reserve_output(path, self._task.keep)
         self._open(self._header)
 
     def take(self) -> None:
@@ -148,8 +149,8 @@ class RecorderProcess:
             self._synced = now
 
     def _flush_is_due(self, waited: float) -> bool:
-        """Whether it is time: a simulation that is slower than real time may wait longer, as small
-        batches are larger in the file."""
+        """Tell whether it is time: a simulation that is slower than real time may wait longer, as
+        small batches are larger in the file."""
         period = self._task.flush_period
         full = self._filled >= period * self._header.base_rate
         return waited >= (period if full else SLOW_FLUSH * period)
@@ -189,7 +190,7 @@ class RecorderProcess:
         """Have what was flushed put on the disk, which a thread waits for: a busy disk may take
         seconds, and the ring must be emptied meanwhile."""
         if self._writer is not None and not self._syncing.is_alive():
-            own = os.dup(self._writer.place.descriptor)  # which a split may close meanwhile
+            own = os.dup(self._writer.output.descriptor)  # which a split may close meanwhile
             self._syncing = threading.Thread(target=self._sync, args=(own,), daemon=True)
             self._syncing.start()
 
@@ -226,10 +227,10 @@ class RecorderProcess:
             self.feed.finish(outcome)
             self.report.live_problem = self.feed.problem
         self.report.size = self._size_before
-        if self._place is not None and self._place.target.is_file():
-            self.report.size += self._place.target.stat().st_size
+        if self._output is not None and self._output.target.is_file():
+            self.report.size += self._output.target.stat().st_size
             if self._files:
-                self._files.append(str(self._place.target))
+                self._files.append(str(self._output.target))
         self.report.files = tuple(self._files)
         self.report.memory = _memory()
         return self.report
@@ -240,12 +241,12 @@ class RecorderProcess:
         if self._writer is not None:
             odd = self._writer.close()
             self.report.odd = "; ".join(filter(None, (self.report.odd, odd)))
-        elif self._place is not None:
+        elif self._output is not None:
             if self._failed is not None and self._failed.recorded:
-                self._place.publish()
+                self._output.publish()
             else:
-                self._place.discard()
-                self._place = None
+                self._output.discard()
+                self._output = None
 
     def _count(self) -> None:
         """Count the ticks in the file, and those that are not."""
@@ -254,7 +255,7 @@ class RecorderProcess:
         self.report.lost = self._taken - self.report.rows if self._task.path else 0
 
     def problems(self) -> list[str]:
-        """The problems so far."""
+        """Return the problems so far."""
         found = []
         if self.report.problem:
             found.append(f"nothing more is recorded: {self.report.problem}")
@@ -305,8 +306,8 @@ def _live_feed(source: str, header: Header, name: str = "") -> LiveFeed:
 
 
 def _went_on(path: Path, ticks: int, back_to: int | None) -> dict[str, Any]:
-    """The outcome in a file of a run that goes on in the file ``path``, or goes back there; ``ticks`` were
-    run so far."""
+    """Return the outcome in a file of a run that goes on in the file ``path``, or goes back there;
+    ``ticks`` were run so far."""
     back = "" if back_to is None else f"went back to tick {back_to} and "
     return {
         "success": False,
@@ -322,7 +323,7 @@ def _went_on(path: Path, ticks: int, back_to: int | None) -> dict[str, Any]:
 
 
 def _memory() -> int:
-    """The largest amount of memory that this process has used [bytes]."""
+    """Return the largest amount of memory that this process has used [bytes]."""
     try:
         import resource
     except ImportError:  # not on Windows
@@ -331,14 +332,19 @@ def _memory() -> int:
     return most if sys.platform == "darwin" else most * 1024
 
 
-class WithoutPandas:
-    """Finds for Python that there is no pandas. Arrow would import it where it is installed, only to see
-    that no value here comes from it, which takes longer than all else that this process does for a short run."""
+class _NoPandas:
+    """Finds for Python that there is no pandas."""
 
     def find_spec(self, name: str, *_: Any) -> None:
-        """Raises ``ModuleNotFoundError`` for pandas; all else is for other finders."""
+        """Raise ``ModuleNotFoundError`` for pandas; all else is for other finders."""
         if name == "pandas":
             raise ModuleNotFoundError(name)
+
+
+def block_pandas_import() -> None:
+    """Let imports of pandas fail in this process. Arrow would import it where it is installed, only to see that no
+    value here comes from it, which takes longer than all else that this process does for a short run."""
+    sys.meta_path.insert(0, _NoPandas())
 
 
 def main(tasks: str) -> None:
@@ -346,7 +352,7 @@ def main(tasks: str) -> None:
     # Whoever stops the graph means the graph: this process ends with it, and not before.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    sys.meta_path.insert(0, WithoutPandas())
+    block_pandas_import()
     import_module("rerun")  # which takes longest, and is needed first when there is a task
     with socket.socket(fileno=int(tasks)) as source_of_tasks:
         task, descriptors, _, _ = socket.recv_fds(source_of_tasks, 1 << 16, 2)

@@ -1,5 +1,5 @@
-"""What a recorder and its process tell each other: the task at the beginning, the report at the end, and
-the kinds of records in the ring between them.
+"""Protocol of a recorder and its process: the task at the beginning, the report at the end, and the
+kinds of records in the ring between them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ come its tick and later ones once more, another way."""
 
 @dataclass(frozen=True)
 class RecorderTask:
-    """What to write.
+    """The task of a recorder.
 
     Attributes:
         capacity: the size of the ring [bytes].
@@ -26,7 +26,7 @@ class RecorderTask:
         split: ticks after which the recording goes on in a new file, at the next keyframe; zero for
             never.
 
-    The descriptor of the ring comes with it, and that of the file, which is locked; see ``place``.
+    The descriptor of the ring comes with it, and that of the file, which is locked; see ``output_file``.
     """
 
     capacity: int
@@ -40,7 +40,7 @@ class RecorderTask:
 
 @dataclass
 class RecorderReport:
-    """What was done.
+    """The report of a recorder at its end.
 
     Attributes:
         rows: the number of ticks in the file, or in all files together.

@@ -40,12 +40,12 @@ _SKIP = 0
 
 
 def make_memory(capacity: int) -> int:
-    """A file descriptor of nameless memory for a ring of ``capacity`` bytes."""
+    """Open nameless memory for a ring of ``capacity`` bytes and return its file descriptor."""
     return nameless_memory(CONTROL + capacity, "aloft-ring")
 
 
 def fitting_capacity(wanted: int, least: int) -> int:
-    """The capacity of a ring, ``wanted`` or more where nothing limits it.
+    """Return the capacity of a ring, ``wanted`` or more where nothing limits it.
 
     A limit on the size of files (``ulimit -f``) holds for shared memory as well. Then the ring is as
     large as it may be, but not below ``least``: a smaller one could not do its work.
@@ -90,7 +90,7 @@ class _Ring:
 
 
 def space_of(size: int) -> int:
-    """The bytes in the ring of a record with ``size`` bytes."""
+    """Return the bytes in the ring of a record with ``size`` bytes."""
     return -(-(_HEAD.size + size + _TAIL.size) // ALIGNMENT) * ALIGNMENT
 
 
@@ -141,7 +141,7 @@ class RingWriter(_Ring):
 
 @dataclass(frozen=True)
 class Record:
-    """One record; ``data`` is a view of the ring that is good until the next one is asked for."""
+    """One record; ``data`` is a view of the ring that is valid until the next one is requested."""
 
     kind: int
     tick: int
@@ -156,7 +156,8 @@ class RingReader(_Ring):
         self._tail = self._sequence = 0
 
     def records(self) -> Iterator[Record]:
-        """All records there are now, each given back to the writer when the next is asked for."""
+        """Yield all records there are now, each given back to the writer when the next is asked
+        for."""
         head = self._counters[0]
         with self._fence:
             pass

@@ -43,7 +43,7 @@ from ..file.messages import (
 from ..file.row_codec import pack
 from ..viewing.blueprint import recording_blueprint
 from ..viewing.drawing import RECORDED
-from .place import RecordingPlace, take_place
+from .output_file import OutputFile, reserve_output
 from .run_stream import RunStream
 
 DRAWN_TICKS, DRAWN_BYTES = 4096, 1 << 25
@@ -61,7 +61,7 @@ class RecordingWriter:
         path: the file; its folder is made.
         header: what is known before the first tick.
         recording_id: by default the graph's name; recordings of one run hold the same data.
-        place: where to write, if that was settled before.
+        output: the file reserved for it, if that was done before.
 
     Attributes:
         recorded: the number of ticks in the file.
@@ -76,13 +76,13 @@ class RecordingWriter:
         path: str | PathLike[str],
         header: Header,
         recording_id: str = "",
-        place: RecordingPlace | None = None,
+        output: OutputFile | None = None,
     ) -> None:
         import rerun as rr
 
-        self.place = place or take_place(Path(path))
+        self.output = output or reserve_output(Path(path))
         self.header = header
-        self.path = self.place.target
+        self.path = self.output.target
         self._size = self._messages = self._drawable = 0
         self._begun = False
         self._index = Index(SEAL_SIZE)
@@ -212,12 +212,12 @@ class RecordingWriter:
             out += data[:FILE_HEAD]
             known, self._begun = crc32(data[:FILE_HEAD]), True
         index, places = b"", {}
-        for place, head, body in split(data):
+        for offset, head, body in split(data):
             kind = HEAD.unpack(head)[0]
             if kind == END:
                 index = body
                 break
-            places[place + HEAD.size] = self._size + len(out) + HEAD.size
+            places[offset + HEAD.size] = self._size + len(out) + HEAD.size
             holds = content if kind == ARROW else Content.PICTURE
             seal = FileMessage(0, 0, ARROW, holds, messages, first, last)
             out += sealed(head, body, seal, known)
@@ -233,10 +233,10 @@ class RecordingWriter:
         at = self._size
         try:
             while rest:
-                count = os.pwrite(self.place.descriptor, rest, at)
+                count = os.pwrite(self.output.descriptor, rest, at)
                 rest, at = rest[count:], at + count
         except OSError as error:
-            os.ftruncate(self.place.descriptor, self._size)
+            os.ftruncate(self.output.descriptor, self._size)
             why = error.strerror or error
             raise OSError(f"{self.path} cannot be written any further ({why})") from error
         self._size = at
@@ -266,14 +266,14 @@ class RecordingWriter:
     def abandon(self) -> str:
         """Give the file its name as it is, after a failure. Returns a warning or nothing."""
         try:
-            return self.place.publish()
+            return self.output.publish()
         finally:
             self._stream.disconnect()
-            self.place.close()
+            self.output.close()
 
 
 def _bytes(data: bytes) -> Any:
-    """An Arrow array of bytes that shares their memory."""
+    """Wrap bytes in an Arrow array that shares their memory."""
     import pyarrow as pa
 
     return pa.Array.from_buffers(pa.uint8(), len(data), [None, pa.py_buffer(data)])

@@ -29,10 +29,10 @@ from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.loading import load_text
 from ...runtime.running.memory import BoundGraph, Snapshot
+from ..file.dependencies import digests, files_read, named_file, other_files, unpacked
 from ..file.format import Header
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read
-from ..file.surroundings import digests, files_read, named_file, other_files, unpacked
 from .replay import late_blocks
 
 _ENTRY = re.compile(r"(?P<block>[^:/]+)\.(?P<parameter>\w+)(?P<kind>: |/)(?P<name>.*)", re.DOTALL)
@@ -41,7 +41,7 @@ _ROBOT = re.compile(r"^robot: .*$", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Restored:
-    """What was restored.
+    """The restored files of a recording.
 
     Attributes:
         text: the graph's text, which names the restored description of the robot.
@@ -97,7 +97,7 @@ def restored(header: Header, text: str, graph_folder: Path, folder: Path) -> Res
 
 
 def _entries(header: Header) -> Iterator[tuple[str, str, str, str, str]]:
-    """Entry, block, parameter, kind and name of each file that the recording carries."""
+    """Yield entry, block, parameter, kind and name of each file that the recording carries."""
     for entry, digest in header.files.items():
         match = _ENTRY.fullmatch(entry)
         if match is not None and digest in header.contents:
@@ -110,7 +110,7 @@ def _write(path: Path, content: bytes) -> None:
 
 
 def _is_present(robot: RobotDescription, text: str, folder: Path) -> bool:
-    """Whether the robot that the graph's text names is, in every value, the recorded one."""
+    """Tell whether the robot that the graph's text names is, in every value, the recorded one."""
     found = _ROBOT.search(text)
     assert found is not None
     name = str(yaml.safe_load(found[0])["robot"])
@@ -166,7 +166,7 @@ class OpenedRun:
         return restored(header, header.graph, self.folder, Path(self._place.name))
 
     def load(self, overrides: Sequence[str] = ()) -> CheckedGraph:
-        """The recorded graph with further overrides. Raises ``LoadError``."""
+        """Load the recorded graph with further overrides. Raises ``LoadError``."""
         header, kept = self.file.header, self.restored
         name = Path(header.source).name or f"{header.name}.yaml"
         changed = [text.partition("=")[0] for text in overrides]
@@ -214,7 +214,7 @@ class OpenedRun:
 
     @property
     def failed(self) -> bool:
-        """Whether a block failed in the tick after the last row."""
+        """True if a block failed in the tick after the last row."""
         outcome = self.file.outcome or {}
         if outcome.get("exit_code") != ExitCode.RUN_FAILED:
             return False
@@ -223,16 +223,16 @@ class OpenedRun:
         return done == outcome.get("ticks")
 
     def rows(self, first: int, last: int) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
-        """The ticks from ``first`` up to ``last``, and their rows."""
+        """Return the ticks from ``first`` up to ``last``, and their rows."""
         return self.file.window(first, last)
 
     def keyframe(self, tick: int) -> Snapshot:
-        """What the graph remembered before ``tick``. Raises ``KeyError``."""
+        """Return the graph's memory before ``tick``. Raises ``KeyError``."""
         return self.file.snapshot(tick)
 
     def changed_dependencies(self) -> list[str]:
-        """The versions, the processor, BLAS and its kernel, and the files and plans that computed the run
-        and are different here."""
+        """List the versions, the processor, BLAS and its kernel, and the files and plans that
+        computed the run and are different here."""
         header = self.file.header
         now = {**versions(), **machine()}
         then = {**header.versions, **header.machine}
@@ -247,7 +247,7 @@ class OpenedRun:
 
 
 def _folder(recording: Path, source: Path) -> Path:
-    """The graph file's folder: as the run named it, seen from here or from the recording."""
+    """Return the graph file's folder: as the run named it, seen from here or from the recording."""
     places = (Path(), recording.parent, recording.parent.parent)
     found = (place / source for place in places if (place / source).is_file())
     return next(found, source).parent
@@ -274,7 +274,7 @@ class TickValues:
         }
 
     def at(self, tick: int) -> Mapping[str, str]:
-        """The values of the last recorded tick up to this one."""
+        """Return the values of the last recorded tick up to this one."""
         first, last = self.ticks
         tick = min(max(tick, first), last)
         known = self._run.ticks

@@ -70,7 +70,7 @@ class _Watch:
 def capture(
     recorded: Replayable, path: str, first: int, last: int
 ) -> tuple[Stretch, dict[str, Any], Difference | None]:
-    """The block at ``path`` in the ticks from ``first`` up to, without, ``last``.
+    """Capture the block at ``path`` in the ticks from ``first`` up to, without, ``last``.
 
     The block's state is found by running the block on recorded inputs from the keyframe before.
 
@@ -146,7 +146,7 @@ def _setting(recorded: Replayable, spec: BlockSpec, first: int, last: int) -> Se
 def _columns(
     layout: Layout, rows: Any, sources: Mapping[str, str], fields: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Every field of some ports over all rows, by ``port.field``."""
+    """Return every field of some ports over all rows, by ``port.field``."""
     return {
         f"{port}.{name}": np.ascontiguousarray(layout.view(rows, f"{source}.{name}"))
         for port, source in sources.items()
@@ -204,7 +204,7 @@ def write_test(
 
 
 def _is_ours(robot: RobotDescription) -> bool:
-    """Whether the robot's name alone gives the same description."""
+    """Tell whether the robot's name alone gives the same description."""
     try:
         return find_robot(robot.name) == robot
     except LookupError:
@@ -212,13 +212,13 @@ def _is_ours(robot: RobotDescription) -> bool:
 
 
 def _names_files(parameters: Mapping[str, Any], folder: Path) -> bool:
-    """Whether any parameter is the name of a file relative to the graph's folder."""
+    """Tell whether any parameter is the name of a file relative to the graph's folder."""
     texts = [value for value in parameters.values() if isinstance(value, str) and value]
     return any((folder / text).exists() for text in texts)
 
 
 def _as_code(value: Any, indent: str = "") -> str:
-    """Plain data as readable Python, with each entry of a mapping on its own line."""
+    """Write plain data as readable Python, with each entry of a mapping on its own line."""
     if not isinstance(value, dict) or not value:
         return json.dumps(value) if isinstance(value, str) else repr(value)
     inner = f"{indent}    "
@@ -231,7 +231,7 @@ def _relative(folder: Path, start: Path) -> str:
 
 
 def _import_of(spec: BlockSpec, folder: Path) -> tuple[str, str]:
-    """The import that the test needs, and how it names the class."""
+    """Return the import that the test needs, and its name for the class."""
     name = block_name(spec.block_type)
     if ":" not in name:
         module = f"aloft.{spec.block_type.__module__.removeprefix(f'{_OURS}.')}"

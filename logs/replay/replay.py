@@ -65,10 +65,10 @@ class Replayable(Protocol):
     def late(self) -> Sequence[str]: ...
 
     def rows(self, first: int, last: int) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
-        """The recorded ticks from ``first`` up to, without, ``last``, and their rows."""
+        """Return the recorded ticks from ``first`` up to, without, ``last``, and their rows."""
 
     def keyframe(self, tick: int) -> Snapshot:
-        """What the graph remembered before ``tick``, one of ``keyframes``. Raises ``KeyError``."""
+        """Return the graph's memory before ``tick``, one of ``keyframes``. Raises ``KeyError``."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class KeptRun:
 
     @classmethod
     def of(cls, result: RunResult, keyframes: Keyframes) -> KeptRun:
-        """The run that gave ``result``, with the keyframes that one of its sinks has taken."""
+        """Return the run that gave ``result``, with the keyframes that one of its sinks has taken."""
         assert result.graph is not None and result.log is not None
         assert result.log.layout is not None and keyframes.layout is not None
         return cls(
@@ -104,12 +104,12 @@ class KeptRun:
         return tuple(self.snapshots)
 
     def rows(self, first: int, last: int) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
-        """The ticks from ``first`` up to ``last``, and their rows."""
+        """Return the ticks from ``first`` up to ``last``, and their rows."""
         start, end = bisect_left(self.ticks, first), bisect_left(self.ticks, last)
         return self.ticks[start:end], self.all_rows[start:end]
 
     def keyframe(self, tick: int) -> Snapshot:
-        """What the graph remembered before ``tick``. Raises ``KeyError``."""
+        """Return the graph's memory before ``tick``. Raises ``KeyError``."""
         return self.snapshots[tick]
 
 
@@ -134,16 +134,17 @@ class Keyframes:
             self.snapshots[tick + 1] = Snapshot(tick + 1, taken.bus, taken.state)
 
     def close(self) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
 
 def late_blocks(notes: Iterable[Note]) -> tuple[str, ...]:
-    """The background blocks of which a result was late, by the notes of a run."""
+    """Return the background blocks of which a result was late, by the notes of a run."""
     return tuple(dict.fromkeys(str(note.data["block"]) for note in notes if note.kind == "late"))
 
 
 def nearest_keyframe(recorded: Replayable, tick: int) -> int | None:
-    """The last keyframe at or before ``tick``; ``None`` where there is none but the beginning."""
+    """Return the last keyframe at or before ``tick``; ``None`` where there is none but the
+    beginning."""
     place = bisect_right(recorded.keyframes, tick)
     return recorded.keyframes[place - 1] if place else None
 
@@ -161,7 +162,7 @@ class RowCursor:
         self._first = self._until = -1
 
     def at(self, tick: int) -> NDArray[np.uint8] | None:
-        """The row of ``tick``; ``None`` where it was not recorded."""
+        """Return the row of ``tick``; ``None`` where it was not recorded."""
         if not self._first <= tick < self._until:
             self._first, self._until = tick, tick + self.PIECE
             self._ticks, self._rows = self._recorded.rows(tick, self._until)
@@ -179,7 +180,7 @@ PIECE = 256
 
 
 class ReplayError(AloftError):
-    """Raised if a recording cannot be replayed in the way that was asked for."""
+    """Raised if a recording cannot be replayed as requested."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +215,7 @@ class Replayed:
 
     @property
     def identical(self) -> bool:
-        """Whether every byte that was compared is the same, and nothing was left out."""
+        """True if every byte that was compared is the same, and nothing was left out."""
         return self.first is None and not self.notes
 
 
@@ -286,7 +287,7 @@ def replay(
 
 
 def default_inputs(graph: CheckedGraph) -> Inputs:
-    """``seed`` if the run can be repeated from its seed, ``recorded`` otherwise."""
+    """Return ``seed`` if the run can be repeated from its seed, ``recorded`` otherwise."""
     real = any(spec.block_type.outside == "real" for spec in graph.blocks)
     return "recorded" if real else "seed"
 
@@ -294,7 +295,7 @@ def default_inputs(graph: CheckedGraph) -> Inputs:
 def _fed(
     graph: CheckedGraph, inputs: Inputs, run: Sequence[str] | None, late: Sequence[str]
 ) -> list[str]:
-    """The blocks that do not run."""
+    """Return the blocks that do not run."""
     paths = [spec.path for spec in graph.blocks]
     if run is not None:
         for path in run:
@@ -310,7 +311,7 @@ def _fed(
 
 
 def _beginning(recorded: Replayable, first_tick: int | None) -> Snapshot | None:
-    """The keyframe to begin with; ``None`` where the run begins as it did."""
+    """Return the keyframe to begin with; ``None`` where the run begins as it did."""
     first, last = int(recorded.ticks[0]), int(recorded.ticks[-1])
     start = first
     if first_tick is not None:
@@ -429,7 +430,7 @@ class Follower:
         self._compare()
 
     def kept(self) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
-        """The replayed ticks and rows, none if they were not to be kept."""
+        """Return the replayed ticks and rows, none if they were not to be kept."""
         if not self._kept:
             return np.zeros(0, np.int64), np.zeros((0, self._rows.shape[1]), np.uint8)
         ticks, rows = zip(*self._kept, strict=True)
@@ -458,7 +459,7 @@ class Follower:
             self._before_tick(self._bound, tick)
 
     def _restore(self, keyframe: Snapshot) -> None:
-        """Bus and state of a keyframe, as far as this graph has the same."""
+        """Restore bus and state of a keyframe, as far as this graph has the same."""
         memory = self._bound.memory
         bus = np.frombuffer(keyframe.bus, np.uint8)
         state = np.frombuffer(keyframe.state, np.uint8)
@@ -486,5 +487,5 @@ class Follower:
 
 
 def _block(name: str) -> str:
-    """The block's path in ``block.port.field``, also at the start of a note."""
+    """Return the block's path in ``block.port.field``, also at the start of a note."""
     return name.split(" ", 1)[0].rpartition(".")[0].rpartition(".")[0]

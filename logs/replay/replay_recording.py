@@ -66,7 +66,7 @@ def write_replay(path: str | PathLike[str], recorded: Replayable, replayed: Repl
 
 
 def _fields(header: Header, replayed: Replayed) -> list[RecordedField]:
-    """The fields of the blocks that ran, those that differ most first."""
+    """Return the fields of the blocks that ran, those that differ most first."""
     ran = dict.fromkeys(replayed.ran)
     fields = {
         field.name: field
@@ -78,7 +78,7 @@ def _fields(header: Header, replayed: Replayed) -> list[RecordedField]:
 
 
 def _blueprint(replayed: Replayed, fields: list[RecordedField]) -> Any:
-    """The fields that differ most, each with both runs in one plot."""
+    """Lay out the fields that differ most, each with both runs in one plot."""
     import rerun.blueprint as rrb
 
     plots = [

@@ -1,1 +1,1 @@
-"""What a recording shows: the robot in 3D, its states, and time series."""
+"""Views of a recording: the robot in 3D, its states, and time series."""

@@ -28,7 +28,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from ...files.problems import Code, LoadError, Problems, nearest
-from ...files.validation import path_text, place_of, read_model
+from ...files.validation import location_of, path_text, read_model
 from ..file.format import (
     DIAGRAM,
     EVENTS,
@@ -62,7 +62,7 @@ def recording_blueprint(
     main_only: bool = False,
     diagram: bool = False,
 ) -> Any:
-    """The layout, saved in the file so that it needs no set-up to look at.
+    """Make the layout, saved in the file so that it needs no set-up to look at.
 
     ``shown`` are the runs in the stream, by default one; of several, each entity has its root.
     ``first_tabs`` come before those made from the graph; with ``follow`` the camera goes along with
@@ -103,7 +103,8 @@ def recording_blueprint(
 
 
 def events_view(shown: Sequence[ShownRun]) -> Any:
-    """What happened: each text begins with its time, as the viewer's column cuts times off."""
+    """Make the view of the events: each text begins with its time, as the viewer's column cuts
+    times off."""
     import rerun.blueprint as rrb
     from rerun.blueprint.encodings import TextLogColumn, TextLogColumnKind, TimelineColumn
 
@@ -125,7 +126,7 @@ def events_view(shown: Sequence[ShownRun]) -> Any:
 
 
 def scene_view(header: Header, shown: Sequence[ShownRun], *, follow: bool = True) -> Any:
-    """The robot in 3D; of a comparison both robots."""
+    """Make the view of the robot in 3D; of a comparison both robots."""
     import rerun.blueprint as rrb
 
     return rrb.Spatial3DView(
@@ -140,18 +141,18 @@ def scene_view(header: Header, shown: Sequence[ShownRun], *, follow: bool = True
 
 
 def main_lanes(header: Header) -> list[Lane]:
-    """The lanes that are shown at first."""
+    """Return the lanes that are shown at first."""
     return [lane for lane in all_lanes(header) if is_main(lane)]
 
 
 def is_main(lane: Lane) -> bool:
-    """Whether a lane is shown at first."""
+    """Tell whether a lane is shown at first."""
     name = lane.field.field_name
     return name in LANES or (bool(lane.field.values) and name not in HIDDEN_LANES)
 
 
 def states_view(header: Header, shown: Sequence[ShownRun]) -> Any:
-    """One lane each for phases, contacts and whether the quadratic program was solved."""
+    """Make one lane each for phases, contacts and whether the quadratic program was solved."""
     import rerun.blueprint as rrb
 
     lanes = [
@@ -191,7 +192,7 @@ class TabEntry(BaseModel):
 
 
 class ViewLayout(BaseModel):
-    """What a layout file says."""
+    """The contents of a layout file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -200,13 +201,13 @@ class ViewLayout(BaseModel):
 
 
 def layout_beside(header: Header) -> Path | None:
-    """The file ``view.yaml`` beside the graph file of a run, if there is one."""
+    """Find the file ``view.yaml`` beside the graph file of a run."""
     path = Path(header.source).parent / FILE_NAME
     return path if header.source and path.is_file() else None
 
 
 def read_layout(path: Path, header: Header) -> ViewLayout:
-    """The layout in a file.
+    """Read the layout in a file.
 
     Raises:
         LayoutError: the file cannot be read or has faults; the message names all, with their places.
@@ -218,7 +219,7 @@ def read_layout(path: Path, header: Header) -> ViewLayout:
     if layout is not None and tree is not None:
         for at, message, near in _unknown_signals(layout, header):
             problems.add(
-                Code.UNKNOWN_SOURCE if near else Code.BAD_VALUE, message, place_of(tree, at),
+                Code.UNKNOWN_SOURCE if near else Code.BAD_VALUE, message, location_of(tree, at),
                 at=path_text(at), nearest=near, fix=near[0] if near else "",
             )  # fmt: skip
     if len(problems) or layout is None:
@@ -229,8 +230,8 @@ def read_layout(path: Path, header: Header) -> ViewLayout:
 def _unknown_signals(
     layout: ViewLayout, header: Header
 ) -> Iterator[tuple[tuple[str | int, ...], str, tuple[str, ...]]]:
-    """Signals that the run has not, that are too large to be drawn, or of another unit, each with the names nearest
-    to it."""
+    """Yield signals that the run has not, that are too large to be drawn, or of another unit, each
+    with the names nearest to it."""
     fields = _fields(header)
     for i, tab in enumerate(layout.tabs):
         for j, plot in enumerate(tab.plots):
@@ -255,7 +256,7 @@ def _fields(header: Header) -> dict[str, RecordedField]:
 
 
 def blueprint_with(layout: ViewLayout, header: Header) -> Any:
-    """The usual layout of a run, with a user's own tabs first."""
+    """Return the usual layout of a run, with a user's own tabs first."""
     import rerun.blueprint as rrb
 
     fields = _fields(header)

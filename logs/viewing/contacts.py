@@ -18,7 +18,7 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses
 from ..file.format import PLOTS, Header, RecordedRows, time_columns
-from .drawing import ChangedRows, Moments, ScenePart, ThinnedRows
+from .drawing import ChangedRows, Moments, SceneDisplay, ThinnedRows
 from .robot_shapes import reach_of
 
 WEIGHT_ARROW = 0.6
@@ -36,12 +36,13 @@ ABOVE_GROUND = 0.001
 
 
 def force_scale(robot: RobotDescription) -> float:
-    """The length of a force arrow for each newton [m/N]: small robots have small forces."""
+    """Return the length of a force arrow for each newton [m/N]: small robots have small forces."""
     return WEIGHT_ARROW * reach_of(robot) / robot.weight
 
 
 def force_arrows(robot: RobotDescription, force: Array) -> Array:
-    """The arrows [m] of forces [N], both (..., 3), none longer than the robot's reach allows."""
+    """Return the arrows [m] of forces [N], both (..., 3), none longer than the robot's reach
+    allows."""
     arrows = force * force_scale(robot)
     lengths = np.linalg.norm(arrows, axis=-1, keepdims=True)
     longest = LONGEST_ARROW * reach_of(robot)
@@ -52,8 +53,8 @@ def force_arrows(robot: RobotDescription, force: Array) -> Array:
 def thruster_forces(
     robot: RobotDescription, poses: LinkPoses, thrust: Array
 ) -> tuple[Array, Array]:
-    """Where the thrusters push and with which forces, for ``thrust`` (n, n_thrusters) [N]: both
-    (n, n_thrusters, 3) [m, N, world]."""
+    """Compute the points at which the thrusters push and their forces, for ``thrust`` (n,
+    n_thrusters) [N]: both (n, n_thrusters, 3) [m, N, world]."""
     places, forces = [], []
     for k, thruster in enumerate(robot.thrusters.values()):
         position, rotation = poses.of(thruster.link)
@@ -62,7 +63,7 @@ def thruster_forces(
     return np.stack(places, axis=1), np.stack(forces, axis=1)
 
 
-class ContactPart(ScenePart):
+class ContactDisplay(SceneDisplay):
     """``contact_forces``, ``friction_cones`` and ``support_polygon``.
 
     A cone stands on each point that carries load; its half angle is the arc tangent of the
@@ -131,7 +132,7 @@ class ContactPart(ScenePart):
 
 
 def cone_lines(friction: float, height: float) -> Array:
-    """One line (n, 3) that draws a friction cone on its tip: a ring with four sides to the tip."""
+    """Draw one line (n, 3) of a friction cone on its tip: a ring with four sides to the tip."""
     angles = np.linspace(0.0, 2.0 * np.pi, CONE_SIDES + 1)
     ring = np.column_stack([np.cos(angles), np.sin(angles), np.full(len(angles), 1.0 / friction)])
     ring *= friction * height
@@ -141,7 +142,8 @@ def cone_lines(friction: float, height: float) -> Array:
 
 
 def convex_hull(points: Array) -> Array:
-    """The closed convex hull (m, 3), seen from above, of points (n, 3), each at its own height.
+    """Compute the closed convex hull (m, 3), seen from above, of points (n, 3), each at its own
+    height.
 
     Empty where there are fewer than two points; a line there and back where all lie on one.
     """
@@ -160,7 +162,7 @@ def convex_hull(points: Array) -> Array:
 
 
 def _turn(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> float:
-    """A number that is positive if the path a, b, c turns to the left."""
+    """Return a number that is positive if the path a, b, c turns to the left."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
@@ -172,13 +174,14 @@ COLORS = (
 )  # fmt: skip
 GREY = 0x9E9E9EB0
 RANGE = (-0.15, 3.0)
-"""What the plot shows at first, in weights of the robot."""
+"""First range of the plot, in weights of the robot."""
 AFTER_TOUCHDOWN = 0.1
-"""How long after a touchdown its peak is looked for [s]."""
+"""Time after a touchdown in which its peak is looked for [s]."""
 
 
 def loads_on_feet(robot: RobotDescription, force: Array) -> Array:
-    """The vertical force on each foot [N], (n, n_feet), of forces on contacts (n, n_contacts, 3)."""
+    """Return the vertical force on each foot [N], (n, n_feet), of forces on contacts (n,
+    n_contacts, 3)."""
     foot = np.array(robot.foot_of_contact())
     columns = [force[:, foot == k, 2].sum(axis=1) for k in range(len(robot.feet))]
     return np.column_stack(columns)
@@ -251,7 +254,7 @@ class LandingPeaks:
     def add(
         self, ticks: NDArray[np.int64], force: Array, touchdowns: list[int]
     ) -> list[tuple[int, str]]:
-        """The events, as (tick, text), of further ticks (n,) with forces (n, n_contacts, 3)."""
+        """Return the events, as (tick, text), of further ticks (n,) with forces (n, n_contacts, 3)."""
         if not self._left and not touchdowns:
             return []
         events = []
@@ -289,7 +292,7 @@ class Flights:
         self._told = False
 
     def add(self, ticks: NDArray[np.int64], loaded: NDArray[np.bool_]) -> list[tuple[int, str]]:
-        """The events, as (tick, text), that show in further ticks.
+        """Return the events, as (tick, text), that show in further ticks.
 
         ``loaded`` (n, n_contacts) says which points carry load.
         """

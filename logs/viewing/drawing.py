@@ -1,4 +1,5 @@
-"""What all drawing shares: how much of a run is drawn, which values of a curve, when and where.
+"""Common parts of all drawing: the amount of a run that is drawn, and the choice of values, times
+and places.
 
 A viewer joins neighbouring values by straight lines. So ``ThinnedRows`` leaves out values that lie on
 the line between those around them, but for less than one can see. Every value that is written is
@@ -38,7 +39,8 @@ class ChangedRows:
     def pick(
         self, ticks: NDArray[np.int64], values: NDArray[Any]
     ) -> tuple[NDArray[np.int64], NDArray[Any]]:
-        """The ticks (m,) and values (m, k) to write of a batch: ``ticks`` (n,), ``values`` (n, k)."""
+        """Return the ticks (m,) and values (m, k) to write of a batch: ``ticks`` (n,), ``values``
+        (n, k)."""
         changed = self._changes(values)
         needed = changed.copy()
         needed[:-1] |= changed[1:]
@@ -54,14 +56,15 @@ class ChangedRows:
         return ticks, values
 
     def rest(self) -> tuple[NDArray[np.int64], NDArray[Any]] | None:
-        """The last tick and value, if they were left out. They are written when no more ticks come."""
+        """Return the last tick and value, if they were left out. They are written when no more
+        ticks come."""
         if not self._left_out or self._tick is None or self._value is None:
             return None
         self._left_out = False
         return self._tick, self._value
 
     def _changes(self, values: NDArray[Any]) -> NDArray[np.bool_]:
-        """Whether each of ``values`` (n, k) has other bits than the one before it, (n,)."""
+        """Tell which of ``values`` (n, k) have other bits than the one before, (n,)."""
         whole = f"i{values.itemsize}"  # as -0.0 equals 0.0, and no NaN itself
         bits = np.ascontiguousarray(values).view(whole)
         changed = np.ones(len(bits), np.bool_)
@@ -86,7 +89,8 @@ class ThinnedRows:
     def pick(
         self, ticks: NDArray[np.int64], values: NDArray[Any]
     ) -> tuple[NDArray[np.int64], NDArray[Any]]:
-        """The ticks (m,) and values (m, k) to write of a batch: ``ticks`` (n,), ``values`` (n, k)."""
+        """Return the ticks (m,) and values (m, k) to write of a batch: ``ticks`` (n,), ``values``
+        (n, k)."""
         ticks, values = self._changed.pick(ticks, values)
         numbers = values.astype(np.float64)
         if len(ticks) < 3 or not numbers.size or not np.isfinite(numbers).all():
@@ -97,15 +101,17 @@ class ThinnedRows:
         return ticks[needed], values[needed]
 
     def rest(self) -> tuple[NDArray[np.int64], NDArray[Any]] | None:
-        """The last tick and value, if they were left out. They are written when no more ticks come."""
+        """Return the last tick and value, if they were left out. They are written when no more
+        ticks come."""
         return self._changed.rest()
 
 
 def on_lines(
     ticks: NDArray[np.int64], values: NDArray[np.float64], tolerance: float
 ) -> NDArray[np.bool_]:
-    """Which of ``values`` (n, k) at ``ticks`` (n,) must be joined by lines, (n,), so that no other
-    value is farther than ``tolerance`` from them (Ramer, Douglas and Peucker, vertical distance).
+    """Mark those of ``values`` (n, k) at ``ticks`` (n,) that must be joined by lines, (n,), so that
+    no other value is farther than ``tolerance`` from them (Ramer, Douglas and Peucker, vertical
+    distance).
 
     The first and the last are among them, and both ends of each stretch of equal values.
     """
@@ -131,7 +137,7 @@ def on_lines(
 
 @dataclass(frozen=True)
 class Detail:
-    """How much is drawn.
+    """The level of detail of a drawing.
 
     Attributes:
         main_only: only the curves and lanes that the viewer shows first; else those of every field
@@ -151,19 +157,20 @@ class Detail:
     most: int = 64
 
     def picker(self) -> ChangedRows | ThinnedRows | None:
-        """What chooses the values of one signal; ``None`` if all that are taken are written."""
+        """Make the object that chooses the values of one signal; ``None`` if all that are taken are
+        written."""
         if self.row_rate is not None:
             return None  # or else a curve would end where its signal does not change
         return ChangedRows() if self.tolerance is None else ThinnedRows(self.tolerance)
 
 
 RECORDED = Detail(main_only=True, tolerance=1.0 / 250.0, picture_rate=50.0, extras=False)
-"""What a recording has beside its numbers: enough for a first look with any Rerun. The tolerance is
-less than a pixel of a plot."""
+"""Detail of a recording beside its numbers: enough for a first look with any Rerun. The tolerance
+is less than a pixel of a plot."""
 WHOLE = Detail()
-"""What ``aloft view`` shows, which is drawn from the numbers."""
+"""Detail of ``aloft view``, which draws from the numbers."""
 LIVE = Detail(row_rate=100.0)
-"""What is shown while a run goes on."""
+"""Detail of a run that is shown while it goes on."""
 
 
 @dataclass(frozen=True)
@@ -203,17 +210,17 @@ class Moments:
         return len(self.due)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """A signal at these instants, (n, ...)."""
+        """Return a signal at these instants, (n, ...)."""
         return self.batch.signal(name)[self.due]
 
     def poses(self, robot: RobotDescription, source: PoseSource) -> LinkPoses:
-        """Where the links are at these instants."""
+        """Compute the poses of the links at these instants."""
         base, turn = source.base(self.__getitem__, len(self))
         return link_poses(robot, base, turn, self[source.joint_position])
 
 
-class ScenePart:
-    """One part of the scene. ``write_static`` is called once, ``write`` for every batch.
+class SceneDisplay:
+    """What draws one thing of the scene. ``write_static`` is called once, ``write`` for every batch.
 
     ``scale`` is the factor by which the sizes of marks and lines suit the robot.
     """
@@ -246,7 +253,8 @@ class ScenePart:
         self.stream.log(f"{self.world}/{name}", what, static=True)
 
     def changing(self, name: str, moments: Moments, *values: NDArray[Any]) -> Moments:
-        """The instants at which some of ``values``, each (n, ...), differ from the instant before.
+        """Return the instants at which some of ``values``, each (n, ...), differ from the instant
+        before.
 
         A viewer keeps what it has, so what stands still for long, as a plan's feet, is written once.
         ``name`` tells apart what is drawn.
@@ -269,7 +277,7 @@ class ScenePart:
 
 @contextmanager
 def opened_stream(path: Path, name: str, layout: Any) -> Iterator[Any]:
-    """A Rerun stream into a file, which is there at the end. Raises ``OSError``."""
+    """Open a Rerun stream into a file, which is there at the end. Raises ``OSError``."""
     import rerun as rr
 
     path.parent.mkdir(parents=True, exist_ok=True)

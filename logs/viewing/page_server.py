@@ -1,4 +1,4 @@
-"""Serves the page of Rerun's web viewer so that a browser which shows it calls nobody outside.
+"""Server of the page of Rerun's web viewer, which makes no browser call another machine.
 
 Rerun's page asks for fonts from Google, and the viewer in it for usage statistics and the newest
 version. This server hands the page on without those links, and with a Content-Security-Policy that
@@ -23,11 +23,11 @@ ADDRESS = "127.0.0.1"
 OUTSIDE = re.compile(rb"<link\b[^>]*https?://[^>]*>")
 """A link of the page to another machine."""
 LOOK_EVERY = 2.0
-"""How often the server looks whether Rerun's is still there [s]."""
+"""Period of the server's checks that Rerun's is still there [s]."""
 
 
 def policy(data_port: int) -> str:
-    """The policy: everything from this server, data from the viewer's port, nothing else."""
+    """Return the policy: everything from this server, data from the viewer's port, nothing else."""
     own = f"'self' data: blob: http://{ADDRESS}:{data_port}"
     code = "'self' 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob:"
     return (
@@ -37,12 +37,12 @@ def policy(data_port: int) -> str:
 
 
 def without_links_outside(page: bytes) -> bytes:
-    """The page without its links to other machines."""
+    """Return the page without its links to other machines."""
     return OUTSIDE.sub(b"", page)
 
 
 def page_server(port: int, page_port: int, data_port: int) -> ThreadingHTTPServer:
-    """The server, which listens but does not serve yet."""
+    """Make the server, which listens but does not serve yet."""
 
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:

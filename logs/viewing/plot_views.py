@@ -20,7 +20,7 @@ from .signal_names import AXES, element_names, unit_of
 
 
 def limits_of(field: RecordedField, header: Header) -> list[tuple[str, float]]:
-    """The limits of a field's elements, each with its name; equal ones are given once.
+    """Return the limits of a field's elements, each with its name; equal ones are given once.
 
     Joint angles have the joints' limits, where these have any. Motor torques and speeds have the
     limits of the actuator profile in use. Joint torques have what these motors give at most
@@ -47,7 +47,7 @@ def limits_of(field: RecordedField, header: Header) -> list[tuple[str, float]]:
 
 
 def _both(name: str, values: list[float]) -> list[tuple[str, float]]:
-    """Each value with both signs."""
+    """Return each value with both signs."""
     signed = (
         (f"{sign}{name}", factor * v) for v in values for sign, factor in (("+", 1), ("-", -1))
     )
@@ -55,7 +55,7 @@ def _both(name: str, values: list[float]) -> list[tuple[str, float]]:
 
 
 def _once(named: Iterable[tuple[str, float]]) -> list[tuple[str, float]]:
-    """Each value once, with the name it had first. What is not finite limits nothing."""
+    """Return each value once, with the name it had first. What is not finite limits nothing."""
     found: dict[float, tuple[str, float]] = {}
     for name, value in named:
         if np.isfinite(value):
@@ -64,7 +64,8 @@ def _once(named: Iterable[tuple[str, float]]) -> list[tuple[str, float]]:
 
 
 MAIN_FIELDS = ("motor_torque", "motor_speed")
-"""Of the port that poses the robot, in the first tab beside centre of mass, base and feet."""
+"""Fields of the port that poses the robot, in the first tab beside centre of mass, base and feet.
+"""
 MOST_IN_LEGEND = 4
 """A legend with more lines than this hides the curves, so it is hidden: the pointer on a curve shows
 its name."""
@@ -79,8 +80,8 @@ DARK = np.array([0x8E3B38FF, 0x3E6B40FF, 0x2B628EFF], np.uint32)
 """x, y and z of a plan, below the true values."""
 
 EVERY_VALUE = "Off"
-"""How Rerun sums up neighbouring values in a plot: not at all, as a mean over a touchdown halves the
-peak of a force, and shows one in the flight before it."""
+"""Rerun's summary of neighbouring values in a plot: none, because a mean over a touchdown halves
+the peak of a force, and shows one in the flight before it."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ class PlotLine:
 
 
 def plot(header: Header, name: str, lines: Sequence[PlotLine], shown: Sequence[ShownRun]) -> Any:
-    """One plot of several fields of the same unit, for all runs."""
+    """Make one plot of several fields of the same unit, for all runs."""
     import rerun.blueprint as rrb
 
     if len(shown) > 1 and len(lines) > 1:
@@ -130,14 +131,14 @@ def plot(header: Header, name: str, lines: Sequence[PlotLine], shown: Sequence[S
 
 
 def legend(count: int) -> Any:
-    """The legend of a plot: in a corner, or none where there are too many lines."""
+    """Return the legend of a plot: in a corner, or none where there are too many lines."""
     import rerun.blueprint as rrb
 
     return rrb.PlotLegend("RightTop", visible=1 < count <= MOST_IN_LEGEND)
 
 
 def looks(lines: Sequence[PlotLine], shown: Sequence[ShownRun]) -> str:
-    """What a title says of lines that lie over one another, in place of a legend."""
+    """Describe lines that lie over one another in the plot's title, in place of a legend."""
     if len(shown) > 1:
         return f" · bold {shown[0].label}, thin {shown[1].label}"
     how = {"estimated": "bright: estimated", "planned": "dark: planned"}
@@ -148,7 +149,7 @@ def looks(lines: Sequence[PlotLine], shown: Sequence[ShownRun]) -> str:
 
 
 def feet_plot(header: Header, shown: Sequence[ShownRun]) -> Any:
-    """The vertical force on each foot, in a range that shows the stance."""
+    """Plot the vertical force on each foot, in a range that shows the stance."""
     import rerun as rr
     import rerun.blueprint as rrb
 
@@ -173,7 +174,7 @@ def feet_plot(header: Header, shown: Sequence[ShownRun]) -> Any:
 
 
 def _series(header: Header, line: PlotLine, label: str, *, other: bool) -> Any:
-    """The legend of a field that shares its plot with others."""
+    """Return the legend of a field that shares its plot with others."""
     import rerun as rr
 
     names = [f"{label} {name}" for name in element_names(line.field, header.robot)]
@@ -185,7 +186,7 @@ def _series(header: Header, line: PlotLine, label: str, *, other: bool) -> Any:
 
 
 def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[ShownRun]) -> list[Any]:
-    """The plots that are shown first.
+    """Return the plots that are shown first.
 
     They show the robot's true, estimated and planned motion, forces and motors. For a graph without
     a
@@ -197,7 +198,7 @@ def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[ShownRu
 
 
 def main_fields(header: Header, ports: ScenePorts | None) -> list[RecordedField]:
-    """The fields in the plots that are shown first."""
+    """Return the fields in the plots that are shown first."""
     return [line.field for _, lines in main_lines(header, ports) for line in lines]
 
 
@@ -238,7 +239,7 @@ def _named(line: PlotLine) -> PlotLine:
 
 
 def block_tabs(header: Header, shown: Sequence[ShownRun]) -> list[Any]:
-    """One tab a block, in it all its signals but for large matrices.
+    """Make one tab a block, in it all its signals but for large matrices.
 
     A block with more plots than fit has a tab in its tab for each port, or for each few plots.
     """
@@ -263,7 +264,7 @@ def block_tabs(header: Header, shown: Sequence[ShownRun]) -> list[Any]:
 
 
 def _pages(views: Sequence[Any], name: str) -> list[Any]:
-    """As many grids as are needed, of about equal size."""
+    """Split the views into as many grids as are needed, of about equal size."""
     count = -(-len(views) // MOST_IN_TAB)
     parts = [views[k * len(views) // count : (k + 1) * len(views) // count] for k in range(count)]
     if count == 1:

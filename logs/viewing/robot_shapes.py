@@ -18,7 +18,7 @@ USUAL_REACH = 0.4
 
 
 def shapes_of(robot: RobotDescription, link: Link) -> list[Shape]:
-    """What is drawn for a link: its collision shapes, or else bones from its origin.
+    """Return the shapes drawn for a link: its collision shapes, or else bones from its origin.
 
     The bones go to the joints that the link carries and to its contact points.
     """
@@ -32,7 +32,7 @@ def shapes_of(robot: RobotDescription, link: Link) -> list[Shape]:
 
 
 def reach_of(robot: RobotDescription) -> float:
-    """The largest distance of a link's origin from the base's in the standing pose [m].
+    """Return the largest distance of a link's origin from the base's in the standing pose [m].
 
     It is the measure of how large things are drawn; 0.1 m for a robot of one link.
     """
@@ -42,14 +42,15 @@ def reach_of(robot: RobotDescription) -> float:
 
 
 def scale_of(robot: RobotDescription) -> float:
-    """How large marks, lines and arrows are drawn, as a factor of what suits BRUCE."""
+    """Return the scale of marks, lines and arrows, as a factor on that of BRUCE."""
     return reach_of(robot) / USUAL_REACH
 
 
 def eye_controls(
     robot: RobotDescription | None, distance: float = 1.0, follow: str | None = None
 ) -> Any:
-    """An eye in front and to the right of a standing robot, ``distance`` times the usual way off.
+    """Place an eye in front and to the right of a standing robot, ``distance`` times the usual way
+    off.
 
     With ``follow`` it keeps its place beside that entity, which moves along with the robot.
     """
@@ -64,7 +65,7 @@ def eye_controls(
 
 
 def eye_height(robot: RobotDescription) -> float:
-    """The height [m] at which the camera looks: that of the base in the standing pose."""
+    """Return the height [m] at which the camera looks: that of the base in the standing pose."""
     return 0.85 * reach_of(robot)
 
 
@@ -75,8 +76,8 @@ HULLS = "hulls"
 def drawn_shapes(
     shapes: Sequence[Shape], color: int, *, wires: bool = False, line_radius: float = 0.0006
 ) -> dict[str, Any]:
-    """What Rerun draws for ``shapes``, in the link's frame, by what follows the link's entity; with ``wires`` only their
-    outlines."""
+    """Make Rerun's drawing of ``shapes``, in the link's frame, by the part of the entity's path
+    after the link's; with ``wires`` only their outlines."""
     drawn = dict[str, Any]()
     if capsules := [shape for shape in shapes if isinstance(shape, Capsule)]:
         drawn[""] = _capsules(capsules, color, wires, line_radius)
@@ -114,7 +115,7 @@ def _mesh(
 
 
 def _capsules(shapes: Sequence[Capsule], color: int, wires: bool, line_radius: float) -> Any:
-    """A capsule of Rerun's reaches from its origin along +z, so each is turned."""
+    """Make Rerun's capsules, which reach from their origin along +z, so each is turned."""
     import rerun as rr
 
     starts = np.array([shape.start for shape in shapes]).reshape(-1, 3)
@@ -146,8 +147,8 @@ def drawn_link(
     *,
     own_colors: bool = True,
 ) -> dict[str, Any]:
-    """What Rerun draws for a link, by what follows the link's entity: its surfaces and what belongs to
-    them, or its collision shapes, or nothing.
+    """Make Rerun's drawing of a link, by the part of the entity's path after the link's: its
+    surfaces and what belongs to them, or its collision shapes, or nothing.
 
     ``color`` (0xRRGGBBAA) is that of all whose colour the description does not say; without ``own_colors`` of all.
     """

@@ -22,23 +22,23 @@ from .contacts import (
     ARROW_RADIUS,
     SHORTEST_FLIGHT,
     TOUCHDOWN,
-    ContactPart,
+    ContactDisplay,
     Flights,
     FootForces,
     LandingPeaks,
     force_arrows,
     thruster_forces,
 )
-from .drawing import Colors, Detail, Moments, ScenePart
+from .drawing import Colors, Detail, Moments, SceneDisplay
 from .robot_shapes import drawn_link, drawn_shapes, eye_height, shapes_of
 from .scene_ports import PoseSource, ScenePorts
-from .scene_sensors import SensorPart
+from .scene_sensors import SensorDisplay
 
 EYE = "eye"
 """The entity below ``world`` that the camera follows."""
 
 
-class RobotPart(ScenePart):
+class RobotDisplay(SceneDisplay):
     """``robot/<link>`` and ``estimate/<link>``: the shapes once, then one pose for each instant.
 
     The shapes come after the first poses, because a viewer that is still loading would else show
@@ -99,7 +99,7 @@ class RobotPart(ScenePart):
         return robots
 
 
-class MassCentrePart(ScenePart):
+class MassCentreDisplay(SceneDisplay):
     """``com``: a ball; ``com_projection``: the plumb line to the ground below it."""
 
     def write_static(self) -> None:
@@ -134,7 +134,7 @@ class MassCentrePart(ScenePart):
         self.send("com_projection", moments, columns)
 
 
-class PlanPart(ScenePart):
+class PlanDisplay(SceneDisplay):
     """``plan/com`` and ``plan/<foot>``: the planned motion, placed where the robot stood at first.
 
     The positions of a plan are relative to where the robot stands before. Here that is the middle
@@ -189,7 +189,7 @@ class PlanPart(ScenePart):
         return self._start
 
 
-class FootTargetPart(ScenePart):
+class FootTargetDisplay(SceneDisplay):
     """``foot_targets/<foot>``: where the controller wants the feet, seen from the base it knows."""
 
     def write_static(self) -> None:
@@ -215,14 +215,15 @@ class FootTargetPart(ScenePart):
             self.send(f"foot_targets/{foot.name}", moments, columns)
 
 
-def foot_outline(part: ScenePart, foot: int, color: int) -> object:
-    """The outline of a sole in its own frame: a box around its contact points and their radius.
+def foot_outline(display: SceneDisplay, foot: int, color: int) -> object:
+    """Make the outline of a sole in its own frame: a box around its contact points and their
+    radius.
 
     The outline of a point foot is a square as wide as the foot.
     """
     import rerun as rr
 
-    robot = part.robot
+    robot = display.robot
     contacts = [c for c in robot.contacts if c.foot == robot.feet[foot].name]
     points = np.array([c.position for c in contacts]).reshape(-1, 3) - robot.feet[foot].sole
     radius = max([c.radius for c in contacts], default=0.01)
@@ -230,10 +231,10 @@ def foot_outline(part: ScenePart, foot: int, color: int) -> object:
     high = points.max(axis=0, initial=0.0) + np.array([radius, radius, 0.0])
     corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
     strip = [(x, y, ABOVE_GROUND) for x, y in [*corners, corners[0]]]
-    return rr.LineStrips3D([strip], colors=[color], radii=[0.0015 * part.scale])
+    return rr.LineStrips3D([strip], colors=[color], radii=[0.0015 * display.scale])
 
 
-class ThrustPart(ScenePart):
+class ThrustDisplay(SceneDisplay):
     """``thrust``: an arrow for the force of every thruster on its link."""
 
     def write_static(self) -> None:
@@ -257,7 +258,7 @@ class ThrustPart(ScenePart):
         self.send("thrust", moments, arrows.partition(np.full(len(moments), places.shape[1])))
 
 
-class PushPart(ScenePart):
+class PushDisplay(SceneDisplay):
     """``push``: an arrow at the robot's named point, of length zero except during the push."""
 
     def write_static(self) -> None:
@@ -290,7 +291,8 @@ class PushPart(ScenePart):
         self.send("push", moments, arrows)
 
     def _acting(self, moments: Moments) -> Moments:
-        """The instants at which it acts, and the first one and those at which it has just ended."""
+        """Return the instants at which it acts, and the first one and those at which it has just
+        ended."""
         acts = (moments[f"{self.ports.push}.force"] != 0.0).any(axis=1)
         return self.changing("push", moments, acts * moments.batch.ticks[moments.due])
 
@@ -308,7 +310,7 @@ DEEPEST_FLOOR = -10.0
 
 
 def color_of_ground(friction: float | None) -> int:
-    """The colour of a piece of ground, as 0xRRGGBBAA."""
+    """Return the colour of a piece of ground, as 0xRRGGBBAA."""
     if friction is None:
         return COLOR
     share = min(max((friction - 0.3) / 0.7, 0.0), 1.0)
@@ -318,7 +320,7 @@ def color_of_ground(friction: float | None) -> int:
 
 
 def _normals(field: HeightField) -> NDArray[np.float64]:
-    """The normals at a field's corners, for its shading, (n, 3)."""
+    """Return the normals at a field's corners, for its shading, (n, 3)."""
     heights = np.array(field.heights)
     rows, columns = heights.shape
     x, y = ((field.most[k] - field.least[k]) / (n - 1) for k, n in enumerate((columns, rows)))
@@ -328,7 +330,7 @@ def _normals(field: HeightField) -> NDArray[np.float64]:
     return unit
 
 
-class TerrainPart(ScenePart):
+class TerrainDisplay(SceneDisplay):
     """``ground``: the boxes of the scene with their edges, and its height fields, drawn once. What is more
     slippery is bluer. A level floor at height zero is not drawn, as the viewer has a grid there."""
 
@@ -378,19 +380,19 @@ class TerrainPart(ScenePart):
         self.log(name, mesh)
 
     def write(self, moments: Moments) -> None:
-        """Nothing: the ground does not move."""
+        """Write nothing: the ground does not move."""
 
 
-PARTS = (
-    TerrainPart,
-    RobotPart,
-    ContactPart,
-    MassCentrePart,
-    PlanPart,
-    FootTargetPart,
-    PushPart,
-    ThrustPart,
-    SensorPart,
+DISPLAYS = (
+    TerrainDisplay,
+    RobotDisplay,
+    ContactDisplay,
+    MassCentreDisplay,
+    PlanDisplay,
+    FootTargetDisplay,
+    PushDisplay,
+    ThrustDisplay,
+    SensorDisplay,
 )
 
 
@@ -409,8 +411,8 @@ class SceneWriter:
         self._stream, self._header, self._ports = stream, header, ports
         self._root = root
         self._every = max(1, round(header.base_rate / detail.picture_rate))
-        self._parts = [
-            part(stream, header, ports, f"{root}world", colors, detail) for part in PARTS
+        self._displays = [
+            display(stream, header, ports, f"{root}world", colors, detail) for display in DISPLAYS
         ]
         self._flights = Flights(max(1, round(SHORTEST_FLIGHT * header.base_rate)))
         self._loads = self._peaks = None
@@ -424,8 +426,8 @@ class SceneWriter:
         import rerun as rr
 
         self._stream.log(f"{self._root}world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        for part in self._parts:
-            part.write_static()
+        for display in self._displays:
+            display.write_static()
         if self._loads is not None:
             self._loads.write_static()
 
@@ -434,8 +436,8 @@ class SceneWriter:
         due = np.flatnonzero(batch.ticks % self._every == 0)
         if len(due):
             moments = Moments(batch, due, time_columns(self._header, batch.ticks[due]))
-            for part in self._parts:
-                part.write(moments)
+            for display in self._displays:
+                display.write(moments)
         if self._loads is not None:
             self._loads.write(batch)
         self._write_flights(batch)

@@ -1,4 +1,4 @@
-"""Which signals of a graph are drawn in 3D.
+"""Signals of a graph that are drawn in 3D.
 
 A port is drawn by the type of its signal: a ``RobotTruth`` poses the solid robot, an
 ``ExternalForce`` is an arrow, and so on. A signal of a project's own is drawn too if it derives
@@ -18,7 +18,8 @@ from ..file.format import Header, RecordedField
 
 @dataclass(frozen=True)
 class Role:
-    """What a port is drawn as: the name of its signal's type, and fields that tell a similar type.
+    """The role in which a port is drawn: the name of its signal's type, and fields that tell a
+    similar type.
 
     A field ``name:dimension`` must also have that dimension. A port with one of the fields in
     ``lacks`` has not this role.
@@ -45,7 +46,7 @@ ROLES = (TRUTH, LOADS, GROUND, BASE, JOINTS, TERMS, FORCES, PLAN, FEET, PUSH, IM
 OTHERS = (
     "BodyTwist", "ContactState", "ContactSwitches", "CourseGoal", "DelayEstimate", "EstimatorHealth", "FootLoad",
     "FootholdPose", "JointCommand", "JointTarget", "JointTorque", "JumpCommand", "JumpFrame", "MassEstimate", "MotorCondition",
-    "PhaseState", "PlaceMeasurement", "PlanPart", "PlanRequest", "PointTarget", "RobotHealth", "SeenStones",
+    "PhaseState", "PoseMeasurement", "PlanSegment", "PlanRequest", "PointTarget", "RobotHealth", "SeenStones",
     "SwitchHealth", "ThrustCommand", "WholeBodyTarget",
 )  # fmt: skip
 """Signals of the common vocabulary that have no role: similar fields do not give them one."""
@@ -63,8 +64,8 @@ class PoseSource:
     joint_position: str
 
     def base(self, values: Callable[[str], Array], count: int) -> tuple[Array, Array]:
-        """Positions (count, 3) and quaternions (count, 4) of the base by a signal's ``values``; a fixed one is at
-        the origin."""
+        """Return positions (count, 3) and quaternions (count, 4) of the base by a signal's
+        ``values``; a fixed one is at the origin."""
         if self.base_position is None or self.base_orientation is None:
             return np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
         return values(self.base_position), values(self.base_orientation)
@@ -77,7 +78,8 @@ class PoseSource:
 
 @dataclass(frozen=True)
 class ScenePorts:
-    """What is drawn, by full names ``block.port.field`` or ``block.port``; ``None`` for nothing.
+    """The signals that are drawn, by full names ``block.port.field`` or ``block.port``; ``None``
+    for nothing.
 
     Attributes:
         pose: poses the robot that is drawn solid: the true one, or else the estimated one.
@@ -110,7 +112,7 @@ Ports = Mapping[str, Mapping[str, RecordedField]]
 
 
 def ports_of(header: Header) -> dict[str, dict[str, RecordedField]]:
-    """Every output as ``block.port``, with its fields by their own names.
+    """Return every output as ``block.port``, with its fields by their own names.
 
     They have the order in which their blocks are executed, so that what is measured comes before what
     is computed from it, a prediction for example. What a wire has delayed comes last.
@@ -128,7 +130,8 @@ def ports_of(header: Header) -> dict[str, dict[str, RecordedField]]:
 
 
 def port_of(ports: Ports, role: Role) -> str | None:
-    """The first port whose signal is of the role's type, or else the first one that is like it."""
+    """Return the first port whose signal is of the role's type, or else the first one that is like
+    it."""
     known = {role.signal for role in ROLES} | set(OTHERS)
     like = None
     for port, fields in ports.items():
@@ -143,7 +146,7 @@ def port_of(ports: Ports, role: Role) -> str | None:
 
 
 def _has(fields: Mapping[str, RecordedField], role: Role) -> bool:
-    """Whether a port has all fields of a role and none that it lacks."""
+    """Tell whether a port has all fields of a role and none that it lacks."""
     wanted = [field.partition(":")[::2] for field in role.fields]
     return not any(name in fields for name in role.lacks) and all(
         name in fields and (not size or size in fields[name].dimensions) for name, size in wanted
@@ -151,7 +154,7 @@ def _has(fields: Mapping[str, RecordedField], role: Role) -> bool:
 
 
 def scene_ports(header: Header) -> ScenePorts | None:
-    """What can be drawn of a graph; ``None`` where nothing says where the robot is."""
+    """Find the ports of a graph that can be drawn; ``None`` where nothing says where the robot is."""
     robot = header.robot
     if robot is None:
         return None
@@ -188,7 +191,8 @@ def scene_ports(header: Header) -> ScenePorts | None:
 def _contacts(
     ports: Ports, terms: str | None, command: str | None
 ) -> tuple[str, str] | tuple[None, None]:
-    """The contact points and the forces on them: true ones, or else computed and commanded ones."""
+    """Return the contact points and the forces on them: true ones, or else computed and commanded
+    ones."""
     loads = port_of(ports, LOADS)
     if loads is not None:
         return f"{loads}.contact_position", f"{loads}.contact_force"
@@ -198,7 +202,7 @@ def _contacts(
 
 
 def block_of(port: str) -> str:
-    """``wbc.command`` -> ``wbc``."""
+    """Return the block of a port: ``wbc`` of ``wbc.command``."""
     return port.rpartition(".")[0]
 
 

@@ -10,12 +10,13 @@ from ...hal.sensors.sensor import MountedSensor, SensorError, mounted_sensors
 from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
 from .contacts import ARROW_RADIUS, force_arrows
-from .drawing import Moments, ScenePart
+from .drawing import Moments, SceneDisplay
 from .scene_ports import Ports, ports_of
 
 
 def sensor_ports(robot: RobotDescription, ports: Ports) -> dict[str, MountedSensor]:
-    """The ports on which the robot publishes mounted sensors, ``block.sensor``, with their sensors.
+    """Return the ports on which the robot publishes mounted sensors, ``block.sensor``, with their
+    sensors.
 
     Sensors of a user's own module that cannot be imported here are left out.
     """
@@ -32,7 +33,7 @@ def sensor_ports(robot: RobotDescription, ports: Ports) -> dict[str, MountedSens
     }
 
 
-class SensorPart(ScenePart):
+class SensorDisplay(SceneDisplay):
     """``sensors/NAME``: an arrow for every mounted sensor that is drawn as one, where it is mounted."""
 
     @cached_property

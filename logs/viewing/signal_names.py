@@ -11,7 +11,7 @@ from ...robots.description import RobotDescription
 from ..file.format import RecordedField
 
 MOST_NAMES = 48
-"""A matrix with more elements than this has no names, and so no plot: nobody could read it."""
+"""Largest number of elements of a matrix that has names, and so a plot: more are unreadable."""
 
 BASE_NAMES = {
     "floating": ("base x", "base y", "base z", "base roll", "base pitch", "base yaw"),
@@ -32,7 +32,7 @@ that of the base's translation, then that of the base's rotation and of the join
 def names_along(
     field: RecordedField, size: int | str, length: int, robot: RobotDescription | None
 ) -> list[str]:
-    """The names along one axis of a field.
+    """Return the names along one axis of a field.
 
     They are the robot's own names for its dimensions; x, y, z (and w) for three or four elements;
     linear and angular x, y, z for six; else numbers.
@@ -54,7 +54,7 @@ def names_along(
 
 
 def element_names(field: RecordedField, robot: RobotDescription | None) -> list[str]:
-    """One name for every element in C order, or none at all for a large matrix."""
+    """Return one name for every element in C order, or none at all for a large matrix."""
     if not field.shape:
         return [field.field_name]
     axes = [
@@ -72,14 +72,14 @@ def element_names(field: RecordedField, robot: RobotDescription | None) -> list[
 
 
 def unit_of(field: RecordedField) -> str:
-    """The unit of a field as a plot's title says it; empty where there is none."""
+    """Return the unit of a field as a plot's title says it; empty where there is none."""
     if field.unit in (None, "", "1"):
         return GENERALISED_UNITS.get(field.field_name, "") if is_generalised(field) else ""
     return str(field.unit)
 
 
 def unit_of_element(field: RecordedField, robot: RobotDescription | None, element: int) -> str:
-    """The unit of one element of a field, given by its place in C order.
+    """Return the unit of one element of a field, given by its place in C order.
 
     A field has one unit for all joints, which is that of those that turn; of a joint that slides, and of
     a motor that moves it, m stands for rad and N for N m.
@@ -101,7 +101,7 @@ def unit_of_element(field: RecordedField, robot: RobotDescription | None, elemen
 
 
 def is_generalised(field: RecordedField) -> bool:
-    """Whether a field has one element for each of the robot's generalised velocities."""
+    """Tell whether a field has one element for each of the robot's generalised velocities."""
     return tuple(field.dimensions) == ("n_velocities",)
 
 
@@ -110,5 +110,5 @@ AXES = np.array([0xEF5350FF, 0x66BB6AFF, 0x42A5F5FF], np.uint32)
 
 
 def axis_colors(field: RecordedField) -> NDArray[np.uint32] | None:
-    """The colours of a vector's three lines; ``None`` where the viewer may choose."""
+    """Return the colours of a vector's three lines; ``None`` where the viewer may choose."""
     return AXES if field.shape == (3,) else None

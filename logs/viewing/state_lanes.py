@@ -39,7 +39,8 @@ class Lane:
 
 
 def all_lanes(header: Header) -> list[Lane]:
-    """The lanes of every field of a run, each with the shortest entity that no other lane has.
+    """Return the lanes of every field of a run, each with the shortest entity that no other lane
+    has.
 
     The viewer writes the entity above a lane, so ``states/left_heel`` reads better than
     ``states/contacts/state/active/left_heel``. Where two lanes would be called the same, both
@@ -62,7 +63,7 @@ def all_lanes(header: Header) -> list[Lane]:
 
 
 def _short_names(lane: Lane) -> Sequence[str]:
-    """What a lane may be called, the shortest name first."""
+    """Return the possible names of a lane, the shortest first."""
     block = lane.field.name.rsplit(".", 2)[0].replace("/", ".")
     field = lane.field.field_name
     full = lane.entity.removeprefix(f"{STATES}/").replace("/", ".")
@@ -73,7 +74,7 @@ def _short_names(lane: Lane) -> Sequence[str]:
 
 
 def lanes_of(field: RecordedField, robot: RobotDescription | None) -> list[Lane]:
-    """The lanes of one field, each by the full name of its signal. Most fields have none."""
+    """Return the lanes of one field, each by the full name of its signal. Most fields have none."""
     entity = entity_of(STATES, field.name)
     if field.values and not field.shape:
         colors = tuple(PALETTE[k % len(PALETTE)] for k in range(len(field.values)))
@@ -111,7 +112,7 @@ class LaneReader:
         self._last: dict[str, int] = {}
 
     def changes(self, batch: RecordedRows) -> Iterator[Changes]:
-        """The changes in a batch. The first batch begins with a change in every lane."""
+        """Yield the changes in a batch. The first batch begins with a change in every lane."""
         for lane in self._lanes:
             values = batch.signal(lane.field.name)
             numbers = values.reshape(len(values), -1)[:, lane.element].astype(np.int64)
@@ -134,7 +135,8 @@ COLUMNS = (
 
 
 def times_table(outcome: Mapping[str, Any]) -> str:
-    """The table as Markdown, made from an outcome (``RunResult.to_json``), in the order of execution."""
+    """Write the table as Markdown, made from an outcome (``RunResult.to_json``), in the order of
+    execution."""
     blocks: Mapping[str, Mapping[str, Any]] = outcome.get("blocks", {})
     lines = ["| block | " + " | ".join(title for title, *_ in COLUMNS) + " |"]
     lines.append("|---|" + "---:|" * len(COLUMNS))

@@ -24,8 +24,8 @@ from ...runtime.language.errors import AloftError
 
 ADDRESS = "127.0.0.1"
 SILENT = {"CI": "1"}
-"""What Rerun's program must find in its environment so that it sends no usage statistics: it takes
-itself to be in a test. Its own switch, ``rerun analytics disable``, is a setting of the user's."""
+"""Environment of Rerun's program that stops its usage statistics: it takes itself to be in a test.
+Its own switch, ``rerun analytics disable``, is a setting of the user's."""
 START_TIME = 60.0
 """Seconds the viewer may take until it listens."""
 STOP_TIME = 5.0
@@ -67,7 +67,7 @@ class Viewer:
         return f"http://{ADDRESS}:{self.web_port}/?url={source}&renderer=webgl"
 
     def is_alive(self) -> bool:
-        """Whether the viewer is running."""
+        """Tell whether the viewer is running."""
         return self.process.poll() is None
 
     def wait(self) -> int:
@@ -182,7 +182,7 @@ def _listens(port: int) -> bool:
 
 
 def free_ports(count: int) -> list[int]:
-    """Ports of this machine on which nothing listens at the moment."""
+    """Find ports of this machine on which nothing listens at the moment."""
     sockets = [socket.socket() for _ in range(count)]
     try:
         for one in sockets:
@@ -194,7 +194,7 @@ def free_ports(count: int) -> list[int]:
 
 
 def find_program() -> Path:
-    """The path of the viewer's own program.
+    """Find the path of the viewer's own program.
 
     It is not the script that starts it: stopping the script would leave the viewer running.
 

@@ -68,7 +68,8 @@ class RecordType:
 
 @cache
 def record_type(name: str, fields: tuple[str, ...]) -> type:
-    """The named tuple of some fields of a signal or of parameters: one class for each choice."""
+    """Make the named tuple of some fields of a signal or of parameters: one class for each
+    choice."""
     made = namedtuple(name, fields)  # type: ignore[misc]  # the names are known only now
     made.__module__ = __name__
     return made
@@ -82,7 +83,7 @@ ArgumentType = NumberType | ArrayType | RecordType
 
 
 def type_of(argument: Any) -> ArgumentType:
-    """The type of an argument. Raises ``TypeError`` for what a kernel cannot take."""
+    """Return the type of an argument. Raises ``TypeError`` for what a kernel cannot take."""
     if isinstance(argument, np.ndarray):
         flags = argument.flags
         order = "C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
@@ -113,12 +114,12 @@ def _array_type(dtype: np.dtype[Any], dimensions: int, order: str) -> ArrayType:
 
 @cache
 def _record_type(kind: type, parts: tuple[ArgumentType, ...]) -> RecordType:
-    """As ``_array_type``."""
+    """Make a record type; cached, as in ``_array_type``."""
     return RecordType(kind, parts)
 
 
 def pack(arguments: tuple[Any, ...]) -> NDArray[np.int64]:
-    """The words of all arguments in a row. They hold addresses: keep the arrays alive."""
+    """Pack the words of all arguments in a row. They hold addresses: keep the arrays alive."""
     words = list(_error_words())
     for argument in arguments:
         _append(argument, words)
@@ -127,20 +128,20 @@ def pack(arguments: tuple[Any, ...]) -> NDArray[np.int64]:
 
 @cache
 def error_record() -> NDArray[np.int64]:
-    """What machine code reports errors with, (3,): whether one was reported, and the addresses of
-    Python's function that sets an error and of the error."""
+    """Return the record with which machine code reports errors, (3,): whether one was reported, and
+    the addresses of Python's function that sets an error and of the error."""
     function = ctypes.cast(ctypes.pythonapi.PyErr_SetString, ctypes.c_void_p).value
     return np.array([0, function or 0, id(ZeroDivisionError)], np.int64)
 
 
 @cache
 def _error_words() -> tuple[int, int]:
-    """The address of the function that reports an error, and that of its record."""
+    """Return the address of the function that reports an error, and that of its record."""
     return machine_code_of(_report_module()).address, int(error_record().ctypes.data)
 
 
 def _report_module() -> Any:
-    """The function that reports an error: it sets it for Python and says so in the record."""
+    """Make the function that reports an error: it sets it for Python and marks it in the record."""
     from llvmlite import ir
 
     word, text = ir.IntType(64), ir.IntType(8).as_pointer()

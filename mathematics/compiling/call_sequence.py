@@ -13,7 +13,7 @@ from .chain_code import NEXT, call_table, chain_function
 
 
 class Call(Protocol):
-    """A ``KernelCall`` or a ``LibraryCall``."""
+    """A ``KernelCall`` or a ``ForeignCall``."""
 
     run: Callable[[], Any]
     when: NDArray[np.int64] | None
@@ -40,7 +40,7 @@ class CallSequence:
 
     @property
     def native(self) -> bool:
-        """Whether the calls are made without the interpreter."""
+        """True if the calls are made without the interpreter."""
         return self._function is not None
 
     def prepare(self) -> None:

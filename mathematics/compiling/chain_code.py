@@ -21,9 +21,9 @@ from .machine_code import ENTRY, machine_code_of
 
 ERROR_FLAG, CLOCK, ENTRIES, NEXT, RUNNING, CURSOR = range(6)
 """The words at the beginning of a table: the address of the word in which kernels report an error;
-that of the system's function that reads a clock, or zero; the number of entries; the
-entry to go on with; the address of the word that says who runs; that of the word with the address
-of the present row of time stamps, which is zero where none are taken."""
+the address of the system's function that reads a clock, or zero; the number of entries; the
+entry to go on with; the address of the word for the call that runs; that of the word with the
+address of the present row of time stamps, which is zero where none are taken."""
 HEAD = 6
 """The number of words before the first entry."""
 FUNCTION, ARGUMENTS, OWNER, ATTENTION, STAMP, WHEN = range(6)
@@ -39,7 +39,8 @@ _MONOTONIC = 1
 
 @cache
 def chain_function() -> Callable[[ctypes.c_size_t], int]:
-    """The function that makes the calls of the table at an address, from the entry ``NEXT`` on.
+    """Return the function that makes the calls of the table at an address, from the entry ``NEXT``
+    on.
 
     It returns zero after the last entry. Where an entry asks for attention it returns the number of
     entries made so far, and goes on behind it when it is called again. A Python error that a call
@@ -63,11 +64,12 @@ class HasAddresses(Protocol):
 def call_table(
     calls: Sequence[HasAddresses], running: NDArray[np.int64], cursor: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """The table of calls without owners, attention and time stamps. Keep the calls and arrays alive.
+    """Make the table of calls without owners, attention and time stamps. Keep the calls and arrays
+    alive.
 
     Args:
         calls: what is called, in this order.
-        running: (1,), where it is written who runs.
+        running: (1,), the number of the call that runs is written there.
         cursor: (1,), the address of the present row of time stamps.
 
     Raises:
@@ -88,20 +90,21 @@ def call_table(
 
 
 def rows_of(table: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The entries of a table, (n, ``WIDTH``), in its memory."""
+    """Return the entries of a table, (n, ``WIDTH``), in its memory."""
     return table[HEAD:].reshape(-1, WIDTH)
 
 
 @cache
 def clock_address() -> int:
-    """The address of the function behind ``time.perf_counter_ns``; zero where it is not known."""
+    """Return the address of the function behind ``time.perf_counter_ns``; zero where it is not
+    known."""
     if not sys.platform.startswith("linux"):
         return 0
     return ctypes.cast(ctypes.CDLL(None).clock_gettime, ctypes.c_void_p).value or 0
 
 
 def _module() -> Any:
-    """The function in LLVM's language."""
+    """Return the function in LLVM's language."""
     from llvmlite import ir
 
     word, narrow = ir.IntType(64), ir.IntType(32)

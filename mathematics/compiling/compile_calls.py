@@ -26,7 +26,7 @@ watchers: list[Watcher] = []
 not called where everything comes from the cache."""
 
 LONGEST_WAIT = 300.0
-"""How long [s] another process may take; what it has not done then is done here."""
+"""Longest wait [s] for another process; the work that it has not done then is done here."""
 _BETWEEN_LOOKS = 0.2
 
 _one_at_a_time = threading.Lock()
@@ -80,7 +80,7 @@ class _Compilation:
         return "; ".join(refused)
 
     def _kept(self, name: str, k: int) -> bytes | None:
-        """The machine code of call ``k`` from the cache, or from the package."""
+        """Return the machine code of call ``k`` from the cache, or from the package."""
         return store.load(name) or shipped.load(self._calls[k].kernel, self._types[k])
 
     def _load(self, name: str, code: bytes | None) -> bool:
@@ -128,7 +128,7 @@ def _tell(done: int, total: int) -> None:
 
 
 def _finished(jobs: Sequence[CompileJob]) -> int:
-    """How many kernels other processes have finished."""
+    """Count the kernels that other processes have finished."""
     return sum(store.holds(job.name) for job in jobs)
 
 
@@ -141,7 +141,7 @@ def _wait(process: ChildProcess, own: int, others: Sequence[CompileJob]) -> None
 
 
 def _name(call: KernelCall, types: tuple[ArgumentType, ...], known: dict[Any, bytes]) -> str:
-    """The name of a call's machine code in the cache."""
+    """Return the name of a call's machine code in the cache."""
     key = call.kernel, types
     if key not in _names:
         if kernels().get(call.name) is not call.kernel:

@@ -38,7 +38,7 @@ VERSION = 1
 
 
 def expanded_code(function: Any, code: CodeType) -> CodeType:
-    """The code of a kernel with loops in place of equations.
+    """Rewrite the code of a kernel with loops in place of equations.
 
     Raises:
         EquationError: a statement cannot be rewritten.
@@ -53,7 +53,8 @@ def expanded_code(function: Any, code: CodeType) -> CodeType:
 
 
 def expanded_definition(function: Any, code: CodeType) -> ast.FunctionDef | None:
-    """The definition of a kernel with loops in place of equations; none where there is no source.
+    """Rewrite the definition of a kernel with loops in place of equations; ``None`` where there is
+    no source.
 
     A function that has variables of another function stays as it is written.
 
@@ -85,11 +86,12 @@ def expanded_definition(function: Any, code: CodeType) -> ast.FunctionDef | None
 
 
 EVENT = "event_"
-"""The name of the argument in which a block's step says whether Python is needed after it."""
+"""Name of the argument by which a block's step requests a call of Python after it."""
 
 
 def reports_event(function: Any) -> bool:
-    """Whether a kernel is a block's step that returns whether ``on_event`` is to be called."""
+    """Return whether a kernel is a block's step that returns whether ``on_event`` is to be
+    called."""
     returns = function.__annotations__.get("return")
     return hasattr(function, "declared_kinds") and returns in ("bool", bool)
 
@@ -112,7 +114,7 @@ class _Rewriter(Expressions):
     # Statements
 
     def body(self, statements: Sequence[ast.stmt]) -> list[ast.stmt]:
-        """Some statements that follow each other."""
+        """Rewrite some statements that follow each other."""
         made: list[ast.stmt] = []
         for statement in statements:
             outer, self._ahead = self._ahead, []
@@ -203,7 +205,7 @@ class _Rewriter(Expressions):
                 self._note(each, NUMBER)
 
     def _target(self, node: ast.expr) -> ast.expr:
-        """The place that a statement writes one number to."""
+        """Rewrite the place that a statement writes one number to."""
         kind = self._kind(node) if isinstance(node, ast.Attribute) else None
         if isinstance(kind, ArrayKind) and kind.rank == 0:
             loaded = _loaded(node)
@@ -218,7 +220,7 @@ class _Rewriter(Expressions):
     # Expressions that are one number, or are handed on
 
     def _expression(self, node: ast.expr) -> ast.expr:
-        """An expression whose value is a number."""
+        """Rewrite an expression whose value is a number."""
         if isinstance(node, ast.Attribute):
             number = self._member(node)
             if number is not None:
@@ -254,7 +256,7 @@ class _Rewriter(Expressions):
         return node
 
     def _reference(self, node: ast.expr) -> ast.expr:
-        """An expression that may be an array, which is handed on as it is."""
+        """Rewrite an expression that may be an array, which is handed on as it is."""
         kind = self._kind(node)
         if isinstance(kind, ArrayKind | RecordKind) and isinstance(
             node, ast.Attribute | ast.Subscript | ast.Name
@@ -269,7 +271,7 @@ class _Rewriter(Expressions):
         return self._expression(node)
 
     def _inside(self, node: ast.expr) -> ast.expr:
-        """What an array is a part of: only its indices are numbers."""
+        """Rewrite the array that a part is taken of: only its indices are numbers."""
         if isinstance(node, ast.Attribute):
             node.value = self._inside(node.value)
         elif isinstance(node, ast.Subscript):
@@ -299,14 +301,15 @@ class _Rewriter(Expressions):
         return node
 
     def _argument(self, node: ast.expr, wanted: Kind) -> ast.expr:
-        """An argument of a call; a kernel may take a scalar field as the array that it is."""
+        """Rewrite an argument of a call; a kernel may take a scalar field as the array that it
+        is."""
         kind = self._kind(node)
         if isinstance(kind, ArrayKind) and kind.rank == 0 and not isinstance(wanted, NumberKind):
             return self._inside(node)
         return self._reference(node)
 
     def _read(self, node: ast.expr, element: type) -> ast.expr:
-        """The number in an element or in a scalar field."""
+        """Read the number in an element or in a scalar field."""
         if isinstance(node, ast.Attribute):
             inner: ast.expr = ast.Subscript(
                 self._inside(node), ast.Tuple([], ast.Load()), ast.Load()
@@ -317,7 +320,7 @@ class _Rewriter(Expressions):
         return inner if element is bool else _called(element.__name__, inner, node)
 
     def _member(self, node: ast.Attribute) -> ast.expr | None:
-        """The number of a member of an enumeration, such as ``Phase.FLIGHT``."""
+        """Return the number of a member of an enumeration, such as ``Phase.FLIGHT``."""
         owner = node.value
         if isinstance(owner, ast.Name) and owner.id not in self._kinds:
             found = self._scope.get(owner.id)
@@ -350,7 +353,7 @@ class _Rewriter(Expressions):
     # Equations on arrays
 
     def _loops(self, node: ast.stmt, target: ast.expr, value: ast.expr) -> list[ast.stmt]:
-        """The loops for ``target = value``, where the target is a part of an array."""
+        """Write the loops for ``target = value``, where the target is a part of an array."""
         assert isinstance(target, ast.Subscript)
         kind = self._kind(target)
         assert isinstance(kind, ArrayKind)
@@ -394,7 +397,7 @@ class _Rewriter(Expressions):
         return ast.Assign([written], self._element(copy.deepcopy(value), places))
 
     def _element(self, node: ast.expr, places: list[ast.expr]) -> ast.expr:
-        """The element of an expression at some places, or the number that it is."""
+        """Return the element of an expression at some places, or the number that it is."""
         kind = self._kind(node)
         if not isinstance(kind, ArrayKind) or kind.rank == 0:
             return self._expression(node)
@@ -414,7 +417,7 @@ class _Rewriter(Expressions):
         return self._children(node, lambda each: self._element(each, places))
 
     def _part(self, node: ast.expr, places: Sequence[ast.expr]) -> ast.expr:
-        """The element of an array, or of a part of one, at some places."""
+        """Return the element of an array, or of a part of one, at some places."""
         places = [copy.deepcopy(place) for place in places]
         if isinstance(node, ast.Attribute) and node.attr == "T":
             return self._part(node.value, places[::-1])
@@ -478,7 +481,7 @@ class _Rewriter(Expressions):
         return ast.copy_location(ast.Name(total, ast.Load()), node)
 
     def _with_cross_products(self, value: ast.expr) -> ast.expr:
-        """The value with each cross product in three numbers that are computed ahead."""
+        """Replace each cross product in the value by three numbers that are computed ahead."""
         rewriter = self
 
         class Products(ast.NodeTransformer):
@@ -513,7 +516,7 @@ class _Rewriter(Expressions):
         return made
 
     def _sizes(self, target: ast.Subscript) -> list[ast.expr]:
-        """How many elements a target has in each dimension that a loop goes through."""
+        """Return the number of elements of a target in each dimension that a loop goes through."""
         kind = self._kind(target)
         assert isinstance(kind, ArrayKind)
         sizes = [self._size_of(target, k) for k in range(kind.rank)]
@@ -573,7 +576,8 @@ class _Rewriter(Expressions):
 
 
 def _path(node: ast.expr) -> str:
-    """The array that an expression is, or is a part of, as text; empty where it is neither."""
+    """Return the array that an expression is, or is a part of, as text; empty where it is
+    neither."""
     while isinstance(node, ast.Subscript) or (isinstance(node, ast.Attribute) and node.attr == "T"):
         node = node.value
     return ast.unparse(node) if isinstance(node, ast.Name | ast.Attribute) else ""

@@ -1,4 +1,4 @@
-"""What the expressions in a kernel are, as far as it follows from the types of its arguments."""
+"""Kinds of the expressions in a kernel, as far as they follow from the types of its arguments."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kin
 
 
 class EquationError(Exception):
-    """A statement of a kernel that cannot be rewritten; the text says where and why."""
+    """A statement of a kernel cannot be rewritten; the text gives place and reason."""
 
 
 def cross(a: Array, b: Array) -> Array:
-    """The cross product of two vectors of three in an equation: ``out[:] = cross(a, b) + c``."""
+    """Declare the cross product of two vectors of three in an equation: ``out[:] = cross(a, b) +
+    c``."""
     raise EquationError(
         "cross(a, b) belongs in an equation of a kernel, such as out[:] = cross(a, b)"
     )
@@ -32,15 +33,15 @@ class Expressions:
         self._kinds: dict[str, Kind] = dict(argument_kinds(function))
 
     def _expression(self, node: ast.expr) -> ast.expr:
-        """An expression rewritten as a number."""
+        """Rewrite an expression as a number."""
         raise NotImplementedError
 
     def _inside(self, node: ast.expr) -> ast.expr:
-        """An array that is handed on, with only its indices rewritten."""
+        """Rewrite only the indices of an array that is handed on."""
         raise NotImplementedError
 
     def _kind(self, node: ast.expr) -> Kind:
-        """What an expression is, as far as it follows from the arguments."""
+        """Find the kind of an expression, as far as it follows from the arguments."""
         if isinstance(node, ast.Name):
             return self._kinds.get(node.id)
         if isinstance(node, ast.Attribute):
@@ -77,7 +78,8 @@ class Expressions:
         return NUMBER if isinstance(node, ast.Constant) else None
 
     def _widest(self, nodes: list[ast.expr]) -> Kind:
-        """The kind of what is made of each element of some expressions: an array if one is."""
+        """Return the kind of what is made of each element of some expressions: an array if one
+        is."""
         arrays = [kind for each in nodes if isinstance(kind := self._kind(each), ArrayKind)]
         arrays = [kind for kind in arrays if kind.rank]
         if arrays:
@@ -112,7 +114,8 @@ class Expressions:
         return NUMBER if left is not None and right is not None else None
 
     def _element_type(self, node: ast.expr) -> type | None:
-        """The type of the number that a place holds; none where it is no number of an array."""
+        """Return the type of the number that a place holds; none where it is no number of an
+        array."""
         if isinstance(node, ast.Attribute):
             kind = self._kind(node)
             return kind.element if isinstance(kind, ArrayKind) and kind.rank == 0 else None
@@ -123,7 +126,8 @@ class Expressions:
         return None
 
     def _covers_elements(self, target: ast.expr) -> bool:
-        """Whether a statement writes several elements: ``x[:]`` where the dimensions are known."""
+        """Return whether a statement writes several elements: ``x[:]`` where the dimensions are
+        known."""
         if not isinstance(target, ast.Subscript):
             return False
         if not any(isinstance(index, ast.Slice) for index in indices_of(target)):
@@ -134,7 +138,8 @@ class Expressions:
         return isinstance(node.func, ast.Name) and self._scope.get(node.func.id) is cross
 
     def _applies_to_elements(self, node: ast.Call) -> bool:
-        """Whether a call is of a function of numbers, which an equation applies to each element."""
+        """Return whether a call is of a function of numbers, which an equation applies to each
+        element."""
         name = node.func
         if isinstance(name, ast.Attribute):
             return isinstance(name.value, ast.Name) and name.value.id == "math"
@@ -147,7 +152,7 @@ class Expressions:
         return bool(notes) and all(note in _NUMBERS for note in notes.values())
 
     def _size_of(self, node: ast.expr, dimension: int) -> ast.expr | None:
-        """The number of elements of an array in a dimension, as an expression."""
+        """Return the number of elements of an array in a dimension, as an expression."""
         kind = self._kind(node)
         if not isinstance(kind, ArrayKind) or kind.rank == 0:
             return None

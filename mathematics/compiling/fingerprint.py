@@ -1,4 +1,4 @@
-"""What the machine code of a kernel depends on, as a short text that names its file in the cache.
+"""Fingerprint of the machine code of a kernel, a short text that names its file in the cache.
 
 It covers the byte code of the kernel and of all kernels that it calls, in whichever module, and the
 constants that they read. Comments, line numbers and the place of the source count for nothing.
@@ -30,7 +30,7 @@ def fingerprint(
     by_source: bool = False,
     known: dict[Any, bytes] | None = None,
 ) -> str:
-    """The name (32 hexadecimal digits) of the machine code of ``kernel`` for these types.
+    """Return the name (32 hexadecimal digits) of the machine code of ``kernel`` for these types.
 
     Args:
         tools: whatever else decides on the machine code: versions, options, the processor.
@@ -63,7 +63,7 @@ def _name(function: Any) -> tuple[str, str]:
 
 
 def closure(kernel: Any) -> list[Any]:
-    """The kernel and all that it calls, each once, in the order in which they are met."""
+    """Return the kernel and all that it calls, each once, in the order in which they are met."""
     found: dict[int, Any] = {}
     pending = [kernel]
     while pending:
@@ -75,14 +75,15 @@ def closure(kernel: Any) -> list[Any]:
 
 
 def _called(function: Any) -> list[Any]:
-    """The kernels that a function names."""
+    """Return the kernels that a function names."""
     scope = function.__globals__
     values = (scope.get(name) for name in written_code(function).co_names)
     return [value for value in values if is_kernel(value)]
 
 
 def _texts(function: Any, by_source: bool) -> Iterator[str]:
-    """The byte code or the source of a function, and the constants of its module that it reads."""
+    """Yield the byte code or the source of a function, and the constants of its module that it
+    reads."""
     code = written_code(function)
     if by_source:
         yield file_digest(code.co_filename)
@@ -102,7 +103,7 @@ def _texts(function: Any, by_source: bool) -> Iterator[str]:
 
 @cache
 def file_digest(file: str) -> str:
-    """The digest of a file's content. Raises ``OSError`` where there is none."""
+    """Return the digest of a file's content. Raises ``OSError`` where there is none."""
     return hashlib.blake2b(Path(file).read_bytes(), digest_size=16).hexdigest()
 
 

@@ -1,4 +1,4 @@
-"""A kernel with the arrays it works on: what a block calls in a tick.
+"""Kernel with the arrays it works on, which a block calls in a tick.
 
 ::
 
@@ -6,7 +6,7 @@
     ...
     self._advance.run()
 
-As long as nothing else is said, ``run`` calls the kernel as plain Python. ``compile_calls`` replaces
+By default ``run`` calls the kernel as plain Python. ``compile_calls`` replaces
 it by the machine code of the same kernel on the same memory, which computes the same bits.
 """
 
@@ -86,7 +86,7 @@ _collecting: list[list[KernelCall]] = []
 
 @contextmanager
 def collect_calls() -> Iterator[list[KernelCall]]:
-    """A list of all calls that are made within the context, in their order."""
+    """Collect all calls that are made within the context, in their order."""
     calls: list[KernelCall] = []
     _collecting.append(calls)
     try:

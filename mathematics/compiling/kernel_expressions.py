@@ -16,7 +16,7 @@ from .llvm_code import (
     BOOL,
     NOTHING,
     FunctionCode,
-    Refused,
+    NotCompilable,
     Slice,
     Value,
     join,
@@ -27,7 +27,7 @@ from .llvm_code import (
 
 
 class CompileError(Exception):
-    """A kernel cannot be compiled; the text says which, where and why."""
+    """A kernel cannot be compiled; the text gives kernel, place and reason."""
 
 
 class Translated(NamedTuple):
@@ -129,29 +129,29 @@ class ExpressionTranslator:
             case ast.Call():
                 return self._call(node)
             case _:
-                raise Refused(f"compiled kernels have no {type(node).__name__.lower()}")
+                raise NotCompilable(f"compiled kernels have no {type(node).__name__.lower()}")
 
     def _constant(self, value: Any) -> Value:
         if isinstance(value, tuple):
             return tuple_of([self._constant(each) for each in value])
         if isinstance(value, bool | int | float | np.number | np.bool_):
             return number(value)  # type: ignore[arg-type]  # a number of NumPy is one, too
-        raise Refused(f"{value!r} is no number"[:200])
+        raise NotCompilable(f"{value!r} is no number"[:200])
 
     def _read_name(self, name: str) -> Value:
         if name in self._fixed:
             return self._fixed[name]
         if name not in self._rooms:
-            raise Refused(f"{name} is read before it is assigned")
+            raise NotCompilable(f"{name} is read before it is assigned")
         value = self._code.load(self._types[name], self._rooms[name])
         counts = name in self._only_counters and name not in self._signed
         return Value(value.type, value.parts, counts=counts) if counts else value
 
     def _outer(self, node: ast.expr) -> Any:
-        """A module, function or constant that the kernel's module has.
+        """Find a module, function or constant that the kernel's module has.
 
         Raises:
-            Refused: it has none of this name, or the name is the kernel's own.
+            NotCompilable: it has none of this name, or the name is the kernel's own.
         """
         if isinstance(node, ast.Name) and node.id not in self._local:
             if node.id in self._closed:
@@ -161,10 +161,10 @@ class ExpressionTranslator:
             for names in (self._scope, builtins):
                 if node.id in names:
                     return names[node.id]
-            raise Refused(f"there is no {node.id}")
+            raise NotCompilable(f"there is no {node.id}")
         if isinstance(node, ast.Attribute):
             return getattr(self._outer(node.value), node.attr)
-        raise Refused(f"{ast.unparse(node)} is not known")
+        raise NotCompilable(f"{ast.unparse(node)} is not known")
 
     def _is_outer(self, node: ast.expr) -> bool:
         while isinstance(node, ast.Attribute):
@@ -178,7 +178,7 @@ class ExpressionTranslator:
         if isinstance(whole.type, RecordType):
             names = getattr(whole.type.kind, "_fields", ())
             if node.attr not in names:
-                raise Refused(f"there is no {node.attr}; there is {', '.join(names)}")
+                raise NotCompilable(f"there is no {node.attr}; there is {', '.join(names)}")
             return whole.members[names.index(node.attr)]
         if node.attr == "shape":
             return tuple_of([code.size(whole, k) for k in range(whole.array.dimensions)])
@@ -191,7 +191,7 @@ class ExpressionTranslator:
             for k in range(whole.array.dimensions):
                 total = code.operation("Mult", total, code.size(whole, k))
             return total
-        raise Refused(f"an array has no {node.attr} in a kernel")
+        raise NotCompilable(f"an array has no {node.attr} in a kernel")
 
     def _subscript(self, node: ast.Subscript) -> Value:
         whole = self._value(node.value)
@@ -199,7 +199,7 @@ class ExpressionTranslator:
         if isinstance(whole.type, RecordType):
             (index,) = indices
             if not isinstance(index, Value) or not isinstance(index.constant, int):
-                raise Refused("the place in a tuple is a constant")
+                raise NotCompilable("the place in a tuple is a constant")
             member = whole.members[index.constant]
             is_size = isinstance(node.value, ast.Attribute) and node.value.attr == "shape"
             return Value(member.type, member.parts, counts=is_size)
@@ -216,7 +216,7 @@ class ExpressionTranslator:
                 made.append(self._value(part))
                 continue
             if part.step is not None:
-                raise Refused("a slice has no step in a kernel")
+                raise NotCompilable("a slice has no step in a kernel")
             bounds = (
                 None if each is None else self._value(each) for each in (part.lower, part.upper)
             )
@@ -250,11 +250,13 @@ class ExpressionTranslator:
                 code.branch(code.truth(self._value(node)), yes, no)
 
     def _flag(self, node: ast.expr) -> Value:
-        """The value of a condition of several parts."""
+        """Write the value of a condition of several parts."""
         if isinstance(node, ast.BoolOp):
             for each in node.values:
                 if not _is_flag(each) and self._kind_of(each) != BOOL:
-                    raise Refused("'and' and 'or' combine conditions; compare the number with one")
+                    raise NotCompilable(
+                        "'and' and 'or' combine conditions; compare the number with one"
+                    )
         code = self._code
         room = code.variable(BOOL)
         yes, no, end = code.name("then"), code.name("else"), code.name("end")
@@ -267,7 +269,7 @@ class ExpressionTranslator:
         return code.load(BOOL, room)
 
     def _kind_of(self, node: ast.expr) -> ArgumentType:
-        """The type of an expression, of which nothing is written."""
+        """Return the type of an expression, without writing its code."""
         kept = len(self._code.lines), len(self._code.entry), self._code.reachable
         kind = self._value(node).type
         del self._code.lines[kept[0] :], self._code.entry[kept[1] :]
@@ -289,9 +291,9 @@ class ExpressionTranslator:
 
     def _call(self, node: ast.Call) -> Value:
         if node.keywords or any(isinstance(each, ast.Starred) for each in node.args):
-            raise Refused("a kernel passes arguments by position")
+            raise NotCompilable("a kernel passes arguments by position")
         if not self._is_outer(node.func):
-            raise Refused(f"{ast.unparse(node.func)} is {_NOT_CALLED}")
+            raise NotCompilable(f"{ast.unparse(node.func)} is {_NOT_CALLED}")
         function = self._outer(node.func)
         arguments = [self._value(each) for each in node.args]
         if function in FUNCTIONS:
@@ -305,7 +307,7 @@ class ExpressionTranslator:
             return Value(kind, tuple(part for each in arguments for part in each.parts))
         made = self._callee(function, tuple(each.type for each in arguments))
         if made is None:
-            raise Refused(f"{ast.unparse(node.func)} is {_NOT_CALLED}")
+            raise NotCompilable(f"{ast.unparse(node.func)} is {_NOT_CALLED}")
         return self._call_kernel(made, arguments)
 
     def _call_kernel(self, made: Translated, arguments: Sequence[Value]) -> Value:
@@ -329,7 +331,7 @@ class ExpressionTranslator:
     def _placed(self, node: ast.stmt | ast.expr) -> Iterator[None]:
         try:
             yield
-        except Refused as error:
+        except NotCompilable as error:
             self._refuse(node, str(error))
 
     def _refuse(self, node: ast.AST, text: str) -> NoReturn:
@@ -342,14 +344,14 @@ _NOT_CALLED = "no kernel, and nothing that kernels may call"
 
 
 def _is_flag(node: ast.expr) -> bool:
-    """Whether an expression is a flag by its form."""
+    """Return whether an expression is a flag by its form."""
     return isinstance(node, ast.Compare | ast.BoolOp) or (
         isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not)
     )
 
 
 def _assignments(tree: ast.FunctionDef) -> tuple[set[str], set[str]]:
-    """The names that a function assigns, and those of them that only loops assign."""
+    """Return the names that a function assigns, and those of them that only loops assign."""
     nodes = list(ast.walk(tree))  # walked once: a walk is slow
     counters = {id(node.target) for node in nodes if isinstance(node, ast.For)}
     stored = [n for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]

@@ -24,22 +24,24 @@ def register(function: Any) -> bool:
 
 
 def kernels() -> dict[str, Callable[..., Any]]:
-    """The kernels of all modules imported so far, by ``module.name`` in order of definition."""
+    """Return the kernels of all modules imported so far, by ``module.name`` in order of
+    definition."""
     return dict(_kernels)
 
 
 def is_kernel(function: object) -> bool:
-    """Whether a function is marked as a kernel."""
+    """Return whether a function is marked as a kernel."""
     return id(function) in _marked
 
 
 def written_code(function: Any) -> CodeType:
-    """The code of a function as it was written; of a kernel, before its equations become loops."""
+    """Return the code of a function as it was written; of a kernel, before its equations become
+    loops."""
     code: CodeType = _written.get(id(function), function.__code__)
     return code
 
 
 def arguments_of(function: Any) -> tuple[str, ...]:
-    """The names of a function's arguments."""
+    """Return the names of a function's arguments."""
     code = written_code(function)
     return code.co_varnames[: code.co_argcount]

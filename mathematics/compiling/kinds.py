@@ -41,12 +41,12 @@ class NumberKind(NamedTuple):
 
 
 Kind = ArrayKind | RecordKind | NumberKind | None
-"""What an expression is; ``None`` where that is not known."""
+"""Kind of an expression; ``None`` where it is not known."""
 NUMBER = NumberKind()
 
 
 def kind_of_annotation(annotation: Any, scope: Mapping[str, Any]) -> Kind:
-    """What an annotation, or the text of one, says; ``scope`` has the names in it."""
+    """Read the kind in an annotation, or in the text of one; ``scope`` has the names in it."""
     annotation = getattr(annotation, "__forward_arg__", annotation)  # the text in a named tuple
     if isinstance(annotation, str):
         try:
@@ -88,7 +88,8 @@ def _compiled(annotation: str) -> CodeType:
 
 @cache
 def argument_kinds(function: Any) -> Mapping[str, Kind]:
-    """What each argument of a kernel is, by its annotation or by what the block declares."""
+    """Return the kind of each argument of a kernel, by its annotation or by the block's
+    declarations."""
     given: Mapping[str, Kind] = getattr(function, "declared_kinds", {})
     return {
         name: given.get(name) or kind_of_annotation(function.__annotations__.get(name), function.__globals__)

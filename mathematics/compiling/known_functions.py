@@ -1,4 +1,5 @@
-"""What a kernel may call beside other kernels: Python's ``min`` and ``abs``, ``math``, and NumPy.
+"""Functions that a kernel may call beside other kernels: Python's ``min`` and ``abs``, ``math``,
+and NumPy.
 
 NumPy's functions of elements take numbers, or arrays and at the end the array to write to.
 """
@@ -11,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from .llvm_code import BOOL, FLOAT, INT, NOTHING, FunctionCode, Refused, Value, join, number
+from .llvm_code import BOOL, FLOAT, INT, NOTHING, FunctionCode, NotCompilable, Value, join, number
 
 Translation = Callable[[FunctionCode, Sequence[Value]], Value]
 """Writes a call with these arguments, and returns its result."""
 
 
 def _function(name: str) -> Translation:
-    """A function of numbers with a fraction, which C's mathematical library or LLVM has."""
+    """Return a function of numbers with a fraction, which C's mathematical library or LLVM has."""
 
     def write(code: FunctionCode, arguments: Sequence[Value]) -> Value:
         operands = [f"double {code.convert(each, FLOAT).parts[0]}" for each in arguments]
@@ -28,7 +29,7 @@ def _function(name: str) -> Translation:
 
 
 def _to_whole(name: str) -> Translation:
-    """A function that rounds to a whole number in its own way."""
+    """Return a function that rounds to a whole number in its own way."""
     rounded = _function(name)
 
     def write(code: FunctionCode, arguments: Sequence[Value]) -> Value:
@@ -77,7 +78,7 @@ def _length(code: FunctionCode, arguments: Sequence[Value]) -> Value:
     (value,) = arguments
     try:
         return code.size(value, 0)
-    except Refused:
+    except NotCompilable:
         return number(len(value.members))
 
 
@@ -121,7 +122,7 @@ FUNCTIONS: dict[Any, Translation] = {
     max: _extreme("Gt"), min: _extreme("Lt"), abs: _absolute, len: _length,
     round: _to_whole("llvm.rint.f64"),
 } | {getattr(math, name): write for name, write in _MATH.items()}  # fmt: skip
-"""How calls of Python's own functions, and of those in ``math``, are written."""
+"""Translations of calls of Python's own functions, and of those in ``math``."""
 
 ELEMENTWISE: dict[Any, Translation] = {
     getattr(np, name): write for name, write in _SAME.items()
@@ -135,11 +136,11 @@ ELEMENTWISE: dict[Any, Translation] = {
     np.square: lambda code, arguments: code.operation("Mult", arguments[0], arguments[0]),
     np.maximum: _extreme("Gt"), np.minimum: _extreme("Lt"),
 }  # fmt: skip
-"""How NumPy's functions of elements are written for one element."""
+"""Translations of NumPy's functions of elements, for one element."""
 
 
 def write_elements(code: FunctionCode, function: Any, arguments: Sequence[Value]) -> Value:
-    """A call of one of NumPy's functions of elements."""
+    """Write a call of one of NumPy's functions of elements."""
     write = ELEMENTWISE[function]
     if len(arguments) == function.nin:
         return write(code, arguments)
@@ -159,7 +160,7 @@ def apply(code: FunctionCode, out: Value, operands: Sequence[Value], write: Tran
                 continue
             skipped = len(places) - each.array.dimensions
             if skipped < 0:
-                raise Refused("an array of more dimensions than the one that is written")
+                raise NotCompilable("an array of more dimensions than the one that is written")
             values.append(code.element(each, places[skipped:]))
         code.assign(out.array, code.place(out, places), write(code, values))
 

@@ -23,8 +23,8 @@ _RANK = {"bool": 0, "int": 1, "float": 2}
 _NUMBER = {"bool": "i1", "int": "i64", "float": "double"}
 
 
-class Refused(Exception):
-    """What a kernel does and compiled code cannot."""
+class NotCompilable(Exception):
+    """A kernel does something that compiled code cannot."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +45,14 @@ class Value:
 
     @property
     def kind(self) -> str:
-        """What kind of number it is.
+        """Kind of the number.
 
         Raises:
-            Refused: it is none.
+            NotCompilable: it is none.
         """
         if isinstance(self.type, NumberType):
             return self.type.kind
-        raise Refused(f"this takes a number, not {_described(self.type)}")
+        raise NotCompilable(f"this takes a number, not {_described(self.type)}")
 
     @property
     def shape(self) -> tuple[str, ...]:
@@ -64,21 +64,21 @@ class Value:
         """The type of an array.
 
         Raises:
-            Refused: it is none.
+            NotCompilable: it is none.
         """
         if isinstance(self.type, ArrayType):
             return self.type
-        raise Refused(f"this takes an array, not {_described(self.type)}")
+        raise NotCompilable(f"this takes an array, not {_described(self.type)}")
 
     @property
     def members(self) -> tuple[Value, ...]:
         """The parts of a tuple.
 
         Raises:
-            Refused: it is none.
+            NotCompilable: it is none.
         """
         if not isinstance(self.type, RecordType):
-            raise Refused(f"this takes a tuple, not {_described(self.type)}")
+            raise NotCompilable(f"this takes a tuple, not {_described(self.type)}")
         made, first = [], 0
         for part in self.type.parts:
             count = len(leaves(part))
@@ -88,11 +88,11 @@ class Value:
 
 
 NOTHING = Value(RecordType(tuple, ()), ())
-"""What a kernel returns that returns nothing."""
+"""Result of a kernel that returns nothing."""
 
 
 def number(value: float | bool) -> Value:
-    """A constant."""
+    """Make a constant."""
     if isinstance(value, bool | np.bool_):
         return Value(BOOL, ("true" if value else "false",), bool(value))
     if isinstance(value, int | np.integer):
@@ -119,10 +119,10 @@ def leaves(kind: ArgumentType) -> tuple[str, ...]:
 
 
 def join(a: ArgumentType, b: ArgumentType) -> ArgumentType:
-    """The type of what is one or the other.
+    """Return the type of a value that is of one type or the other.
 
     Raises:
-        Refused: there is none.
+        NotCompilable: there is none.
     """
     if a == b:
         return a
@@ -133,7 +133,7 @@ def join(a: ArgumentType, b: ArgumentType) -> ArgumentType:
             return ArrayType(a.dtype, a.dimensions, "A")
         case RecordType(), RecordType() if a.kind is b.kind and len(a.parts) == len(b.parts):
             return RecordType(a.kind, tuple(map(join, a.parts, b.parts)))
-    raise Refused(f"this is {_described(a)} here and {_described(b)} elsewhere")
+    raise NotCompilable(f"this is {_described(a)} here and {_described(b)} elsewhere")
 
 
 def _described(kind: ArgumentType) -> str:
@@ -172,7 +172,7 @@ class FunctionCode:
     # Lines and labels
 
     def name(self, stem: str = "t") -> str:
-        """A new name."""
+        """Make a new name."""
         self._count += 1
         return f"{stem}{self._count}"
 
@@ -216,7 +216,7 @@ class FunctionCode:
         self.label(onward)
 
     def variable(self, kind: ArgumentType) -> tuple[str, ...]:
-        """Room for a value, one address for each of its operands."""
+        """Allocate a variable, with one address for each of its operands."""
         places = []
         for leaf in leaves(kind):
             place = f"%{self.name('v')}"
@@ -238,7 +238,7 @@ class FunctionCode:
     # Numbers
 
     def convert(self, value: Value, kind: ArgumentType) -> Value:
-        """A value as one of a wider type; numbers also as narrower ones, as Python's types do."""
+        """Convert a value to a wider type; numbers also to narrower ones, as Python's types do."""
         if value.type == kind:
             return value
         if isinstance(kind, RecordType):
@@ -258,7 +258,7 @@ class FunctionCode:
         return Value(kind, (self.result(text),), counts=value.kind == "bool")
 
     def operation(self, name: str, a: Value, b: Value) -> Value:
-        """``a + b`` and so on; ``name`` is that of the class in ``ast``."""
+        """Write ``a + b`` and so on; ``name`` is that of the class in ``ast``."""
         if name in _BITS and a.kind == b.kind == "bool":
             return Value(BOOL, (self.result(f"{_BITS[name]} i1 {a.parts[0]}, {b.parts[0]}"),))
         kind = join(INT, join(a.type, b.type))
@@ -281,7 +281,7 @@ class FunctionCode:
         if name in ("Add", "Sub", "Mult"):
             return self.result(f"{_REAL[name]} double {x}, {y}")
         if name not in ("Div", "Mod", "FloorDiv"):
-            raise Refused(f"numbers with a fraction have no {name}")
+            raise NotCompilable(f"numbers with a fraction have no {name}")
         if not b.constant:
             self.fail_if(self.result(f"fcmp oeq double {y}, 0.0"))
         if name == "Div":
@@ -289,7 +289,8 @@ class FunctionCode:
         return self._divide_with_rest(x, y)[0 if name == "FloorDiv" else 1]
 
     def _divide_with_rest(self, x: str, y: str) -> tuple[str, str]:
-        """The quotient and rest of two numbers, as Python's ``float.__divmod__`` finds them."""
+        """Write the quotient and rest of two numbers, as Python's ``float.__divmod__`` finds
+        them."""
         r = self.result
         rest = self.call("fmod", "double", f"double {x}", f"double {y}")
         exact = r(f"fcmp oeq double {rest}, 0.0")
@@ -322,7 +323,7 @@ class FunctionCode:
         if name in _WHOLE:
             return r(f"{_WHOLE[name]} i64 {x}, {y}")
         if name not in ("Mod", "FloorDiv"):
-            raise Refused(f"whole numbers have no {name}")
+            raise NotCompilable(f"whole numbers have no {name}")
         if not b.constant:
             self.fail_if(r(f"icmp eq i64 {y}, 0"))
         rest = r(f"srem i64 {x}, {y}")
@@ -348,7 +349,7 @@ class FunctionCode:
             if b.constant is not None and 0 < b.constant <= _LARGEST_POWER:
                 return self.operation("Mult", self._power(a, number(b.constant - 1)), a)
             if a.constant != 2 or not (b.counts or b.type == INT):
-                raise Refused("of powers of whole numbers there are x ** 3 and 2 ** n")
+                raise NotCompilable("of powers of whole numbers there are x ** 3 and 2 ** n")
             return Value(INT, (self.result(f"shl i64 1, {b.parts[0]}"),), counts=True)
         x, y = self.convert(a, FLOAT).parts[0], self.convert(b, FLOAT).parts[0]
         return Value(FLOAT, (self.call("pow", "double", f"double {x}", f"double {y}"),))
@@ -362,9 +363,9 @@ class FunctionCode:
         return Value(value.type, (self.result(f"{text} {value.parts[0]}"),))
 
     def compare(self, name: str, a: Value, b: Value) -> Value:
-        """``a < b`` and so on; ``name`` is that of the class in ``ast``."""
+        """Write ``a < b`` and so on; ``name`` is that of the class in ``ast``."""
         if name not in _COMPARISONS:
-            raise Refused(f"numbers are compared by < <= > >= == !=, not by {name}")
+            raise NotCompilable(f"numbers are compared by < <= > >= == !=, not by {name}")
         kind = join(INT, join(a.type, b.type))
         x, y = self.convert(a, kind).parts[0], self.convert(b, kind).parts[0]
         whole, real = _COMPARISONS[name]
@@ -401,7 +402,7 @@ class FunctionCode:
         return Value(INT, (value.shape[dimension],), counts=True)
 
     def strides(self, value: Value) -> Iterator[str]:
-        """The bytes between neighbours in each dimension of an array."""
+        """Yield the bytes between neighbours in each dimension of an array."""
         kind = value.array
         if kind.order == "A":
             yield from value.parts[1 + kind.dimensions :]
@@ -415,7 +416,7 @@ class FunctionCode:
         yield from (found[: kind.dimensions])[:: -1 if kind.order == "C" else 1]
 
     def place(self, value: Value, indices: Sequence[Value]) -> str:
-        """The address of an element; negative indices count from the end."""
+        """Return the address of an element; negative indices count from the end."""
         kind, leaf = value.array, memory_type(value.array)
         indices = [self._from_start(i, value.shape[k]) for k, i in enumerate(indices)]
         if kind.order == "A":
@@ -437,7 +438,7 @@ class FunctionCode:
 
     def _from_start(self, index: Value, size: str) -> Value:
         if index.kind != "int":
-            raise Refused("an index is a whole number; write int(...)")
+            raise NotCompilable("an index is a whole number; write int(...)")
         if index.counts:
             return index
         wrapped = self.result(f"add nsw i64 {index.parts[0]}, {size}")
@@ -451,7 +452,7 @@ class FunctionCode:
         return self.read(value.array, self.place(value, indices))
 
     def read(self, kind: ArrayType, place: str) -> Value:
-        """The element at an address."""
+        """Read the element at an address."""
         dtype, leaf = np.dtype(kind.dtype), memory_type(kind)
         loaded = self.result(f"load {leaf}, ptr {place}")
         if dtype.kind == "b":
@@ -478,7 +479,7 @@ class FunctionCode:
         kind = value.array
         full = [*indices, *[Slice(None, None)] * (kind.dimensions - len(indices))]
         if len(full) > kind.dimensions:
-            raise Refused(f"{len(indices)} indices for {_described(kind)}")
+            raise NotCompilable(f"{len(indices)} indices for {_described(kind)}")
         begins: list[Value] = []
         shape: list[str] = []
         kept: list[int] = []
@@ -502,7 +503,7 @@ class FunctionCode:
         return Value(made, (address, *shape, *(strides[k] for k in kept)))
 
     def _range(self, index: Slice, size: str) -> tuple[str, str]:
-        """The first place and the length of a slice, as Python limits them."""
+        """Return the first place and the length of a slice, as Python limits them."""
         first = "0" if index.first is None else self._limited(index.first, size)
         last = size if index.end is None else self._limited(index.end, size)
         if first == "0":
@@ -559,7 +560,7 @@ def memory_type(kind: ArrayType) -> str:
         return "double" if dtype.itemsize == 8 else "float"
     if dtype.kind in "iub":
         return f"i{8 * dtype.itemsize}"
-    raise Refused(f"an array of {kind.dtype} cannot be read")
+    raise NotCompilable(f"an array of {kind.dtype} cannot be read")
 
 
 def _same(code: FunctionCode, operand: str, leaf: str, wanted: str, text: str) -> str:
@@ -567,7 +568,8 @@ def _same(code: FunctionCode, operand: str, leaf: str, wanted: str, text: str) -
 
 
 def _is_contiguous(indices: Sequence[Any]) -> bool:
-    """Whether a part of an array in the order of C has no gaps: numbers, one slice, whole slices."""
+    """Return whether a part of an array in the order of C has no gaps: numbers, one slice, whole
+    slices."""
     sliced = False
     for index in indices:
         if isinstance(index, Value):

@@ -16,7 +16,7 @@ from . import store
 ENTRY = "aloft_entry"
 """The name of the only function that the object file of a kernel exports."""
 OPTIONS = "strict floating point, errors as in Python, loops kept, 4"
-"""What is asked of the compiler; the number at the end counts changes of the calling convention."""
+"""Options of the compiler; the number at the end counts changes of the calling convention."""
 OLDEST = {
     "x86_64-unknown-linux-gnu": "x86-64",
     "aarch64-unknown-linux-gnu": "generic",
@@ -27,7 +27,7 @@ OLDEST = {
 
 @cache
 def tools() -> str:
-    """The versions, options and processor on which machine code depends.
+    """Return the versions, options and processor on which machine code depends.
 
     Raises:
         ImportError: there is no LLVM.
@@ -71,7 +71,7 @@ def processor() -> tuple[str, str]:
 
 
 def target_machine() -> Any:
-    """What LLVM makes code with."""
+    """Make LLVM's target machine, which emits the code."""
     binding, (name, features) = _binding(), processor()
     return binding.Target.from_default_triple().create_target_machine(
         cpu=name,
@@ -83,7 +83,7 @@ def target_machine() -> Any:
 
 
 def optimised(assembly: str) -> bytes:
-    """The object file of a module in LLVM's language, which LLVM optimises as far as it can.
+    """Return the object file of a module in LLVM's language, which LLVM optimises as far as it can.
 
     Raises:
         RuntimeError: the module is not valid.
@@ -95,7 +95,7 @@ def optimised(assembly: str) -> bytes:
 
 
 def cross_compiled(assembly: str, triple: str, cpu: str, features: str = "") -> bytes:
-    """The object file of a module for another kind of processor.
+    """Return the object file of a module for another kind of processor.
 
     Raises:
         RuntimeError: the module is not valid, or LLVM has no such processor.
@@ -106,7 +106,7 @@ def cross_compiled(assembly: str, triple: str, cpu: str, features: str = "") -> 
 
 
 def assembler_text(assembly: str, triple: str, cpu: str, features: str = "") -> str:
-    """The same code as ``cross_compiled`` gives, as a text for an assembler.
+    """Return the same code as ``cross_compiled`` gives, as a text for an assembler.
 
     Raises:
         RuntimeError: the module is not valid, or LLVM has no such processor.
@@ -117,7 +117,7 @@ def assembler_text(assembly: str, triple: str, cpu: str, features: str = "") -> 
 
 
 def _for_processor(assembly: str, triple: str, cpu: str, features: str) -> tuple[Any, Any]:
-    """A module, optimised for a processor, and what makes code of it."""
+    """Return a module, optimised for a processor, and its target machine."""
     binding = _binding()
     binding.initialize_all_targets()
     binding.initialize_all_asmprinters()
@@ -127,7 +127,7 @@ def _for_processor(assembly: str, triple: str, cpu: str, features: str) -> tuple
 
 
 def _optimised(assembly: str, triple: str, machine: Any) -> Any:
-    """The module of a text, optimised."""
+    """Parse a module's text and optimise it."""
     binding = _binding()
     module = binding.parse_assembly(assembly)
     module.triple = triple
@@ -142,7 +142,8 @@ def _optimised(assembly: str, triple: str, machine: Any) -> Any:
 
 
 def read_only_arguments(assembly: str, names: set[str]) -> dict[str, tuple[bool, ...]]:
-    """For each operand of some functions of a module whether nothing is written through it.
+    """Return, for each operand of some functions of a module, whether nothing is written through
+    it.
 
     It is what LLVM can prove; an operand that is no address counts as such.
 
@@ -172,7 +173,7 @@ def read_only_arguments(assembly: str, names: set[str]) -> dict[str, tuple[bool,
 
 
 def assemble(assembly: str) -> bytes:
-    """The object file of a module in LLVM's language, which has been optimised already."""
+    """Return the object file of a module in LLVM's language, which has been optimised already."""
     module = _binding().parse_assembly(assembly)
     code: bytes = target_machine().emit_object(module)
     return code
@@ -208,7 +209,8 @@ _numbers = count()
 
 
 def machine_code_of(module: Any) -> MachineCode:
-    """The function ``ENTRY`` of a module in LLVM's language, from the cache or made now; it stays in memory.
+    """Return the function ``ENTRY`` of a module in LLVM's language, from the cache or made now; it
+    stays in memory.
 
     Such modules do what kernels cannot: call functions by their addresses.
     """

@@ -58,12 +58,12 @@ def divide(jobs: Sequence[CompileJob], processors: int) -> list[list[CompileJob]
 
 
 def _code_below(kernel: Any) -> dict[int, int]:
-    """The sizes of the code of a kernel and of all that it calls."""
+    """Return the sizes of the code of a kernel and of all that it calls."""
     return {id(function): len(written_code(function).co_code) for function in closure(kernel)}
 
 
 def processors() -> int:
-    """How many processors this process may use."""
+    """Return the number of processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -71,7 +71,7 @@ def processors() -> int:
 
 @contextmanager
 def helpers(shares: Sequence[Sequence[CompileJob]]) -> Iterator[list[ChildProcess]]:
-    """A process for each share, whose end the caller waits for; none is left behind."""
+    """Start a process for each share, whose end the caller waits for; none is left behind."""
     with ExitStack() as stack:
         started: list[ChildProcess] = []
         for share in shares:
@@ -84,7 +84,7 @@ def helpers(shares: Sequence[Sequence[CompileJob]]) -> Iterator[list[ChildProces
 
 
 def _packed(job: CompileJob) -> bytes:
-    """A job for another process; empty where that could not find the kernel by its name."""
+    """Pack a job for another process; empty where that could not find the kernel by its name."""
     try:
         kernel = job.kernel
         return pickle.dumps((job.name, kernel.__module__, kernel.__qualname__, job.signature))

@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 
 FOLDER = Path(__file__).parent
 _SAME_DATE = (1980, 1, 1, 0, 0, 0)
-"""Of all entries, so that equal machine code is equal archives."""
+"""Date of all entries, so that equal machine code gives equal archives."""
 
 Kernel = tuple[Callable[..., Any], tuple[ArgumentType, ...]]
 """A kernel and the types of its arguments."""
 
 
 def load(kernel: Callable[..., Any], signature: tuple[ArgumentType, ...]) -> bytes | None:
-    """The machine code of a kernel from the package.
+    """Load the machine code of a kernel from the package.
 
     Returns:
         ``None`` where there is none that was made of the same sources by the same tools, where it is

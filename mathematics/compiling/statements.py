@@ -13,7 +13,7 @@ from typing import Any
 from .arguments import ArgumentType, NumberType, RecordType
 from .kernel_expressions import Callee, CompileError, ExpressionTranslator, Translated
 from .known_functions import apply
-from .llvm_code import INT, NOTHING, Refused, Value, join, leaves, number
+from .llvm_code import INT, NOTHING, NotCompilable, Value, join, leaves, number
 
 _MOST_PASSES = 12
 
@@ -25,7 +25,7 @@ def translate(
     name: str,
     callee: Callee,
 ) -> Translated:
-    """A kernel in LLVM's language.
+    """Translate a kernel into LLVM's language.
 
     Args:
         function: the kernel; its module has the names that it reads.
@@ -51,10 +51,10 @@ class _Function(ExpressionTranslator):
     """One pass through the statements of a function."""
 
     def translated(self, name: str) -> Translated:
-        """The function as it is after this pass."""
+        """Return the function as it is after this pass."""
         code = self._code
         self._loops: list[tuple[str, str]] = []
-        """Where 'continue' and 'break' go, of the loops around a statement."""
+        """Targets of 'continue' and 'break' in the loops around a statement."""
         names = [each.arg for each in self._tree.args.args]
         if len(names) != len(self._signature):
             self._refuse(
@@ -118,7 +118,7 @@ class _Function(ExpressionTranslator):
             case ast.Break():
                 self._code.jump(self._loops[-1][1])
             case _:
-                raise Refused(f"compiled kernels have no {type(node).__name__.lower()}")
+                raise NotCompilable(f"compiled kernels have no {type(node).__name__.lower()}")
 
     def _assign(self, target: ast.expr, value: Value) -> None:
         if isinstance(target, ast.Name):
@@ -126,17 +126,17 @@ class _Function(ExpressionTranslator):
         elif isinstance(target, ast.Tuple):
             members = value.members
             if len(members) != len(target.elts):
-                raise Refused(f"{len(members)} values for {len(target.elts)} names")
+                raise NotCompilable(f"{len(members)} values for {len(target.elts)} names")
             for each, part in zip(target.elts, members, strict=True):
                 self._assign(each, part)
         elif isinstance(target, ast.Subscript):
             self._write(*self._target(target), value)
         else:
-            raise Refused(f"{ast.unparse(target)} cannot be assigned")
+            raise NotCompilable(f"{ast.unparse(target)} cannot be assigned")
 
     def _assign_name(self, name: str, value: Value) -> None:
         if value.type == NOTHING.type:
-            raise Refused(f"{name} would be None")
+            raise NotCompilable(f"{name} would be None")
         known = self._types.get(name)
         widest = value.type if known is None else join(known, value.type)
         if known is None:
@@ -150,7 +150,7 @@ class _Function(ExpressionTranslator):
         self._code.store(self._code.convert(value, widest), self._rooms[name])
 
     def _target(self, node: ast.Subscript) -> tuple[Value, str | None]:
-        """A part of an array, or the array and the address of one element of it."""
+        """Write a part of an array, or return the array and the address of one element of it."""
         whole, indices = self._value(node.value), self._indices(node)
         numbers = [index for index in indices if isinstance(index, Value)]
         if len(numbers) == len(indices) == whole.array.dimensions:
@@ -178,7 +178,7 @@ class _Function(ExpressionTranslator):
                 self._assign_name(node.target.id, code.operation(name, part, value))
                 return
         else:
-            raise Refused(f"{ast.unparse(node.target)} cannot be assigned")
+            raise NotCompilable(f"{ast.unparse(node.target)} cannot be assigned")
         apply(code, part, [part, value], lambda code, values: code.operation(name, *values))
 
     def _if(self, node: ast.If) -> None:
@@ -235,15 +235,15 @@ class _Function(ExpressionTranslator):
             and node.func.id == "range"
             and 1 <= len(node.args) <= 3
         ):
-            raise Refused("a loop goes over range(...)")
+            raise NotCompilable("a loop goes over range(...)")
         values = [self._value(each) for each in node.args]
         if any(value.kind == "float" for value in values):
-            raise Refused("range takes whole numbers")
+            raise NotCompilable("range takes whole numbers")
         if len(values) == 1:
             values.insert(0, number(0))
         start, stop, *step = values
         if step and step[0].constant == 0:
-            raise Refused("range() with a step of zero")
+            raise NotCompilable("range() with a step of zero")
         return start, stop, step[0] if step else number(1)
 
     def _while(self, node: ast.While) -> None:
@@ -265,7 +265,7 @@ class _Function(ExpressionTranslator):
     def _return(self, node: ast.Return) -> None:
         value = NOTHING if node.value is None else self._value(node.value)
         if not all(isinstance(each, NumberType) for each in _parts(value)):
-            raise Refused("a kernel returns numbers, or a tuple of numbers")
+            raise NotCompilable("a kernel returns numbers, or a tuple of numbers")
         known = self._types.get(_RESULT, value.type)
         widest = join(known, value.type)
         if self._types.get(_RESULT) != widest:

@@ -16,13 +16,13 @@ _DIGEST = 16
 
 
 def cache_folder() -> Path:
-    """Where machine code is kept: ``aloft/kernels`` in the user's cache folder."""
+    """Return the cache folder of machine code: ``aloft/kernels`` in the user's cache folder."""
     root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(root) / "aloft" / "kernels"
 
 
 def load(name: str) -> bytes | None:
-    """The machine code called ``name``, or ``None`` where there is none or it is damaged."""
+    """Load the machine code called ``name``; ``None`` where there is none or it is damaged."""
     try:
         content = _place(name).read_bytes()
     except OSError:
@@ -31,7 +31,7 @@ def load(name: str) -> bytes | None:
 
 
 def holds(name: str) -> bool:
-    """Whether there is a file for the machine code called ``name``."""
+    """Return whether there is a file for the machine code called ``name``."""
     return _place(name).is_file()
 
 
@@ -60,7 +60,7 @@ def sealed(code: bytes) -> bytes:
 
 
 def unsealed(content: bytes) -> bytes | None:
-    """The machine code behind its checksum, or ``None`` where that does not fit."""
+    """Return the machine code behind its checksum, or ``None`` where that does not fit."""
     checksum, code = content[:_DIGEST], content[_DIGEST:]
     return code if _checksum(code) == checksum else None
 

@@ -1,4 +1,4 @@
-"""From a kernel to an object file, by LLVM.
+"""Translation of a kernel to an object file, by LLVM.
 
 The arguments are read from the words that ``arguments.pack`` wrote. Floating point is strict: no
 reordering of sums and no fused multiply-add, so the machine code rounds as plain Python does.
@@ -27,7 +27,7 @@ class Translator:
         self._definitions: dict[int, Any] = {}
 
     def object_code(self, kernel: Callable[..., Any], signature: tuple[ArgumentType, ...]) -> bytes:
-        """The object file of ``kernel`` for arguments of these types.
+        """Return the object file of ``kernel`` for arguments of these types.
 
         Raises:
             CompileError: the kernel does what compiled code cannot.
@@ -35,7 +35,7 @@ class Translator:
         return optimised(self.module(kernel, signature))
 
     def results(self, kernel: Callable[..., Any], signature: tuple[ArgumentType, ...]) -> int:
-        """How many numbers a kernel returns for arguments of these types.
+        """Return the number of results of a kernel for arguments of these types.
 
         Raises:
             CompileError: the kernel does what compiled code cannot.
@@ -99,11 +99,12 @@ ATTRIBUTES = """\
 attributes #0 = { nounwind }
 attributes #1 = { nounwind willreturn memory(none) }
 !0 = !{!"branch_weights", i32 1, i32 4000}"""
-"""What the functions of a module refer to, at its end."""
+"""Attributes that the functions of a module refer to, at its end."""
 
 
 def _entry_point(made: Translated, name: str, signature: tuple[ArgumentType, ...]) -> str:
-    """The function that reads the arguments from the words at an address and calls the kernel.
+    """Write the function that reads the arguments from the words at an address and calls the
+    kernel.
 
     A kernel raises no errors of its own; if one divides by zero, the entry point sets Python's
     error, and the caller raises it.

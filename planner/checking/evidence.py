@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import Motors, RobotDescription
@@ -25,9 +24,10 @@ from ...robots.kinematics import (
 from ...robots.welding import welded
 from ..models.euler_angles import euler_angles
 from ..models.exact_dynamics import dynamics_of
-from ..models.link_shapes import arms, gaps_between, lacking, legs, moving_shapes
+from ..models.link_shapes import arms, clearance_deficit, gaps_between, legs, moving_shapes
 from ..models.robot_model import model_of, stances_of
 from ..models.symmetry import mirrored_pairs, symmetrised
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.scaling import per_robot
 from ..task.sequence import LEVEL, edge_of, ground_axes
@@ -72,7 +72,7 @@ def ground_height(
 def body_heights(
     robot: RobotDescription, task: JumpTask, poses: LinkPoses, progress: Array
 ) -> dict[str, Array]:
-    """By link, except for soles, the lowest height [m] of its shapes above the ground, (n,).
+    """Return by link, except for soles, the lowest height [m] of its shapes above the ground, (n,).
 
     Balls along their edges stand for them, close enough that no edge of a step passes between two. Where
     the ground has edges, a ball's height is that of its lower side above the ground right below it. What a foot
@@ -111,8 +111,10 @@ def body_heights(
     return found
 
 
-def arm_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> tuple[Array, str] | None:
-    """Return the same as ``leg_lack`` between each of the ``arms`` and all that is no part of it; and which link lacks
+def arm_clearance_deficit(
+    robot: RobotDescription, poses: LinkPoses, wanted: float
+) -> tuple[Array, str] | None:
+    """Return the same as ``leg_clearance_deficit`` between each of the ``arms`` and all that is no part of it; and which link lacks
     most. ``None`` where no arm has shapes that could touch.
     """
     parent = {joint.child: joint.parent for joint in robot.joints}
@@ -127,20 +129,20 @@ def arm_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> tuple[
                 if not (own and others):
                     continue
                 near = gaps_between(own, others)
-                found = lacking(near, wanted, 0, carried=other.name == parent[link])
+                found = clearance_deficit(near, wanted, 0, carried=other.name == parent[link])
                 lack = found if lack is None else np.maximum(lack, found)
                 if found.max() > most:
                     most, worst_link = float(found.max()), f"{link} at {other.name}"
     return None if lack is None else (lack, worst_link)
 
 
-def leg_lack(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array | None:
-    """By how much [m] the links of different legs are closer than ``wanted``, or than at the first
-    instant where they stand closer than that, the worst at each instant (n,); ``None`` where no
-    two legs have shapes."""
+def leg_clearance_deficit(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array | None:
+    """Return the distance [m] by which the links of different legs are closer than ``wanted``, or than at the first
+    instant where they stand closer than that, the worst at each instant (n,); ``None`` where no two legs have shapes.
+    """
     lack: Array | None = None
     for gap in _gaps(robot, poses):
-        found = lacking(gap, wanted, 0)
+        found = clearance_deficit(gap, wanted, 0)
         lack = found if lack is None else np.maximum(lack, found)
     return lack
 
@@ -159,7 +161,7 @@ def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:
 
 @per_robot
 def _asymmetric(robot: RobotDescription) -> bool:
-    """See ``Evidence.asymmetric``."""
+    """Return ``Evidence.asymmetric``."""
     robot = welded(robot).robot
     pairs = mirrored_pairs(robot)
     return pairs is not None and symmetrised(robot, pairs) != robot
@@ -171,7 +173,7 @@ MILLIMETRE = 1e-3
 
 @dataclass(frozen=True)
 class PlanTestResult:
-    """What a test found: it passes where ``value`` is at most ``limit``."""
+    """Result of a test: it passes where ``value`` is at most ``limit``."""
 
     name: str
     value: float
@@ -198,18 +200,20 @@ class Evidence:
 
     @property
     def motors(self) -> Motors:
-        """What every motor can do."""
+        """Abilities of every motor."""
         return self.robot.motors
 
     @cached_property
     def asymmetric(self) -> bool:
-        """Whether the robot is nearly the same left and right but not exactly: its plans in
-        mirrored coordinates are made for the robot that is."""
+        """True if the robot is nearly the same left and right but not exactly: its plans in mirrored coordinates are
+        made for the robot that is.
+        """
         return _asymmetric(self.robot)
 
     def model_error(self, exact: float, nearly: float) -> float:
-        """What a test of the planner's own equations allows: ``exact``, or ``nearly`` where the
-        planner's model is the robot made the same left and right."""
+        """Return the tolerance of a test of the planner's own equations: ``exact``, or ``nearly`` where the planner's
+        model is the robot made the same left and right.
+        """
         return nearly if self.asymmetric else exact
 
     @cached_property
@@ -245,7 +249,7 @@ class Evidence:
 
     @cached_property
     def progress(self) -> Array:
-        """How many flights are over at the samples, with the share of the present one's time."""
+        """Number of flights that are over at the samples, with the share of the present one's time."""
         time = self.replay.samples.time
         return np.asarray(
             sum(
@@ -256,7 +260,7 @@ class Evidence:
 
     @cached_property
     def place(self) -> NDArray[np.int64]:
-        """How many flights are over at the samples."""
+        """Number of flights that are over at the samples."""
         return np.asarray(np.searchsorted(self.plan.touchdown_times, self.replay.samples.time,
                                           side="right"))  # fmt: skip
 
@@ -299,8 +303,9 @@ class Evidence:
 
     @cached_property
     def resting(self) -> Array:
-        """What keeps its place while a contact point stands on the ground [m], (n, n_contacts, 3):
-        the point itself; of a ball, which rolls, the way of the material where it touches."""
+        """Places that stay fixed while a contact point stands on the ground [m], (n, n_contacts, 3): the point itself;
+        of a ball, which rolls, the way of the material where it touches.
+        """
         s = self.replay.samples
         places = s.points.copy()
         steps = np.diff(s.time)[:, None]
@@ -323,7 +328,7 @@ class Evidence:
 
     @cached_property
     def turn(self) -> tuple[float, float]:
-        """How far the base has turned in pitch and in yaw from first knot to last [rad].
+        """Turn of the base in pitch and in yaw from first knot to last [rad].
 
         The angles are those of R = Ry Rx Rz, followed through full turns.
         """
@@ -336,7 +341,7 @@ class Evidence:
         return f"at {self.replay.samples.time[sample]:.3f} s"
 
     def figures(self) -> dict[str, float]:
-        """What the plan does and how hard, by name with unit."""
+        """Return the plan's performance and loads, by name with unit."""
         r, lasting = self.replay, np.diff(self.plan.time) > 0.0
         force = self.plan.contact_force[:-1][lasting].sum(axis=1)[:, 2]
         k = r.flights[0][0]

@@ -12,12 +12,12 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import fall_height
 from ..models.link_shapes import arms
 from ..task.margins import Margins, joint_bounds
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.scaling import per_robot
 from ..task.sequence import ground_axes
@@ -26,22 +26,22 @@ from .evidence import (
     MILLIMETRE,
     Evidence,
     PlanTestResult,
-    arm_lack,
+    arm_clearance_deficit,
     body_heights,
-    leg_lack,
+    leg_clearance_deficit,
     worst,
 )
 from .replay import replay
 
 HIT_TOLERANCE = 0.05
-"""m/s by which feet may be faster at touchdown than the margins say."""
+"""Margin by which feet may be faster at touchdown than the task's margins [m/s]."""
 SHORTEST_IMPACT = 0.004
 """s; as long as the feet's contact takes to stop them at least. What a motor can do in that time
 bounds its impulse at touchdown."""
 
 
 def start_and_end(e: Evidence) -> Iterator[PlanTestResult]:
-    """Yield the plan begins at rest in its stance over the origin and ends at rest."""
+    """Test that the plan begins at rest in its stance over the origin and ends at rest."""
     plan, joints = e.plan, [joint.name for joint in e.robot.joints]
     missed = np.abs(plan.position[0, 7:] - e.start_joints)
     yield PlanTestResult("start", missed.max(), 1e-3, "rad", "the first knot's distance from the stance",
@@ -61,7 +61,7 @@ def start_and_end(e: Evidence) -> Iterator[PlanTestResult]:
 
 
 def states(e: Evidence) -> Iterator[PlanTestResult]:
-    """Centre of mass, momentum and torque agree with those that Pinocchio computes from states and forces."""
+    """Test that centre of mass, momentum and torque agree with those that Pinocchio computes from states and forces."""
     plan, r = e.plan, e.replay
     for name, planned, exact, limit, unit in (
         ("com", plan.com, r.com, 1e-5, "m"),
@@ -81,7 +81,7 @@ def states(e: Evidence) -> Iterator[PlanTestResult]:
 
 
 def interval_defects(e: Evidence) -> Iterator[PlanTestResult]:
-    """Exact dynamics from each knot leads to the next."""
+    """Test that exact dynamics from each knot lead to the next."""
     for column, (name, limit, unit) in enumerate(
         (
             ("position_defect", MILLIMETRE, "m"),
@@ -97,8 +97,8 @@ def interval_defects(e: Evidence) -> Iterator[PlanTestResult]:
 
 
 def discretisation(e: Evidence) -> Iterator[PlanTestResult]:
-    """Yield the planner's own equations on the ground, of the formulation that is built on them; in the air it
-    conserves momentum, as exact dynamics do.
+    """Test the planner's own equations on the ground, of the formulation that is built on them; in the air it conserves
+    momentum, as exact dynamics do.
     """
     if e.plan.task.formulation != "full":
         return
@@ -119,7 +119,7 @@ def discretisation(e: Evidence) -> Iterator[PlanTestResult]:
 
 
 def flight(e: Evidence) -> Iterator[PlanTestResult]:
-    """The whole flight by exact dynamics ends where the plan says."""
+    """Test that the whole flight by exact dynamics ends at the plan's touchdown."""
     plan, r = e.plan, e.replay
     position, rotation = (max(errors) for errors in zip(*r.flight_errors, strict=True))
     yield PlanTestResult(
@@ -136,7 +136,7 @@ def flight(e: Evidence) -> Iterator[PlanTestResult]:
 
 
 def task_done(e: Evidence) -> Iterator[PlanTestResult]:
-    """Yield every jump reaches the height, place, heading and rotation that the task asks for."""
+    """Test that every jump reaches the height, place, heading and rotation of the task."""
     task, r = e.plan.task, e.replay
     hops, places = task.hops(), task.places()
     for name, missed, limit, unit, text in (
@@ -182,8 +182,9 @@ def task_done(e: Evidence) -> Iterator[PlanTestResult]:
 
 
 def _standing_knots(e: Evidence) -> list[int]:
-    """After each jump but the last, the last knot at which all contact points are on the ground: in a
-    later part of the thrust the heels may have left it. The lift-off where there is no such knot."""
+    """Return, after each jump but the last, the last knot at which all contact points are on the ground: in a later
+    part of the thrust the heels may have left it. The lift-off where there is no such knot.
+    """
     found = []
     for (_, touchdown), (lift_off, _) in zip(e.replay.flights, e.replay.flights[1:], strict=False):
         level = np.flatnonzero(e.plan.contact[touchdown:lift_off].all(axis=1))
@@ -192,12 +193,12 @@ def _standing_knots(e: Evidence) -> list[int]:
 
 
 def _which(e: Evidence, jump: int) -> str:
-    """Says which of several jumps is meant."""
+    """Return the number of one of several jumps as words."""
     return f" jump {jump + 1}" if len(e.replay.flights) > 1 else ""
 
 
 def contacts(e: Evidence) -> Iterator[PlanTestResult]:
-    """Feet stay where they stand, on the ground, and push only there, within the friction cone."""
+    """Test that feet stay where they stand, on the ground, and push only there, within the friction cone."""
     plan, s = e.plan, e.replay.samples
     names = [contact.name for contact in e.robot.contacts]
     loaded = plan.contact[s.knot]
@@ -228,7 +229,7 @@ def contacts(e: Evidence) -> Iterator[PlanTestResult]:
 
 
 def touchdown(e: Evidence) -> Iterator[PlanTestResult]:
-    """Feet that are to arrive at rest do, and those that may hit the ground are slow enough."""
+    """Test that feet which are to arrive at rest do, and that those that may hit the ground are slow enough."""
     plan, r, s = e.plan, e.replay, e.replay.samples
     knots = [touchdown for _, touchdown in r.flights]
     if plan.task.impact:
@@ -255,8 +256,9 @@ def touchdown(e: Evidence) -> Iterator[PlanTestResult]:
 
 
 def _hits(e: Evidence, knots: list[int]) -> Iterator[PlanTestResult]:
-    """How fast points hit the ground, downwards and along or across the heading in which their feet
-    shall stand, where bounded. Balls have no heading of their own, and the base may yaw in flight."""
+    """Test the speeds at which points hit the ground, downwards and along or across the heading in which their feet
+    shall stand, where bounded. Balls have no heading of their own, and the base may yaw in flight.
+    """
     margins, s = e.plan.task.margins, e.replay.samples
     if margins is None:
         return
@@ -295,7 +297,7 @@ def _impact(e: Evidence, knot: int) -> tuple[float, Array]:
 
 
 def momentum(e: Evidence) -> Iterator[PlanTestResult]:
-    """Yield the angular momentum at lift-offs and touchdowns is no more than the task allows."""
+    """Test that the angular momentum at lift-offs and touchdowns is no more than the task allows."""
     task, r = e.plan.task, e.replay
     lasting = np.diff(e.plan.time, append=np.inf) > 0.0
     ends = [stop + int(not lasting[stop]) for _, stop in r.flights]
@@ -311,7 +313,7 @@ def momentum(e: Evidence) -> Iterator[PlanTestResult]:
 
 
 def machine(e: Evidence) -> Iterator[PlanTestResult]:
-    """Joints stay within their limits, motors within what they can do at their speed."""
+    """Test that joints stay within their limits, and motors within what they can do at their speed."""
     robot, s = e.robot, e.replay.samples
     angles, limits = s.position[:, 7:], robot.joint_limits
     excess = np.maximum(angles - limits[:, 1], limits[:, 0] - angles)
@@ -353,7 +355,7 @@ _fall_height = per_robot(fall_height)
 
 
 def clearances(e: Evidence) -> Iterator[PlanTestResult]:
-    """Nothing but the feet comes near the ground, the feet clear it in flight, legs stay apart."""
+    """Test that only the feet come near the ground, that they clear it in flight, and that legs stay apart."""
     robot, task = e.robot, e.plan.task
     names = [contact.name for contact in robot.contacts]
     low = -e.point_height
@@ -374,16 +376,16 @@ def clearances(e: Evidence) -> Iterator[PlanTestResult]:
     low = _fall_height(robot) - e.base_height
     yield PlanTestResult("base_height", float(low.max()), MILLIMETRE, "m",
                 "how far the base is below the height that counts as a fall", e.moment(int(low.argmax())))  # fmt: skip
-    lacking = leg_lack(robot, e.poses, task.leg_clearance)
-    if lacking is not None:  # else no two legs have shapes that could touch
-        sample = int(lacking.argmax())
-        yield PlanTestResult("leg_clearance", float(lacking[sample]), MILLIMETRE, "m",
+    deficit = leg_clearance_deficit(robot, e.poses, task.leg_clearance)
+    if deficit is not None:  # else no two legs have shapes that could touch
+        sample = int(deficit.argmax())
+        yield PlanTestResult("leg_clearance", float(deficit[sample]), MILLIMETRE, "m",
                     "what the legs lack of the gap asked for", e.moment(sample))  # fmt: skip
-    swung = arm_lack(robot, e.poses, task.leg_clearance) if task.moving else None
+    swung = arm_clearance_deficit(robot, e.poses, task.leg_clearance) if task.moving else None
     if swung is not None:
-        lacking, link = swung
-        sample = int(lacking.argmax())
-        yield PlanTestResult("arm_clearance", float(lacking[sample]), MILLIMETRE, "m",
+        deficit, link = swung
+        sample = int(deficit.argmax())
+        yield PlanTestResult("arm_clearance", float(deficit[sample]), MILLIMETRE, "m",
                     "what moving arms lack of that gap to the rest of the body",
                     f"{link} {e.moment(sample)}")  # fmt: skip
 
@@ -392,28 +394,28 @@ PLAN_TESTS: tuple[Callable[[Evidence], Iterator[PlanTestResult]], ...] = (
     start_and_end, states, interval_defects, discretisation, flight, task_done, contacts, touchdown,
     momentum, machine, clearances,
 )  # fmt: skip
-"""All tests, in the order of the report."""
+"""Tests in the order of the report."""
 
 
 NEAR = 0.985
 """The share of a limit from which it counts as reached."""
 NEAR_LIMIT = 0.01
-"""rad; the same for a joint's limit."""
+"""Distance from a joint's limit at which it counts as reached [rad]."""
 LEAST_TIME = 0.02
-"""Of the plan's instants, how many must be at a limit for it to be named."""
+"""Share of the plan's instants that must be at a limit for it to be named."""
 LEAST_GAP = 0.002
 """m that calves keep from the ground where the task's margins say nothing."""
 SIDES = {
     "left": "", "right": "", "l": "", "r": "",
     **dict.fromkeys(("fl", "fr", "lf", "rf"), "fore"), **dict.fromkeys(("rl", "rr", "hl", "hr", "lh", "rh"), "hind"),
 }  # fmt: skip
-"""How names of joints and motors begin by their leg, and what is left of it."""
+"""Side or pair of legs by the first word of a joint's or motor's name."""
 
 
 def active_limits(plan: PlannedJump, robot: RobotDescription) -> tuple[str, ...]:
-    """What the plan uses to the full: the motors whose torque or speed, and the joints whose limits, it reaches,
-    by their names without the side, in the robot's order; then clearances, how fast the feet touch down, and
-    friction."""
+    """Return what the plan uses to the full: the motors whose torque or speed, and the joints whose limits, it reaches,
+    by their names without the side, in the robot's order; then clearances, touchdown speed, and friction.
+    """
     robot = plan.task.equipped(robot)
     evidence = Evidence(plan, robot, replay(plan, robot))
     effort, motors = evidence.effort, evidence.motors
@@ -454,9 +456,10 @@ def active_limits(plan: PlannedJump, robot: RobotDescription) -> tuple[str, ...]
 
 
 def _narrow(e: Evidence) -> Iterator[str]:
-    """Between what the plan keeps no more than the gap that the task asks for: ``foot`` and ground in the middle of
+    """Yield the clearances at which the plan keeps no more than the task's gap: ``foot`` and ground in the middle of
     the flight, ``ground`` and the lowest part of the body, ``base`` and the height that counts as a fall, ``leg`` and
-    leg. What starts as near does not count."""
+    leg. What starts as near does not count.
+    """
     robot, task = e.robot, e.plan.task
     gap = (task.margins or Margins()).step
     at = [int(np.abs(e.progress - 0.5 - i).argmin()) for i in range(len(e.plan.flights))]
@@ -470,13 +473,13 @@ def _narrow(e: Evidence) -> Iterator[str]:
     ):
         if height.min() < least + MILLIMETRE < height[0]:
             yield name
-    lacking = leg_lack(robot, e.poses, task.leg_clearance)
-    if lacking is not None and lacking[0] < -MILLIMETRE < lacking.max():
+    deficit = leg_clearance_deficit(robot, e.poses, task.leg_clearance)
+    if deficit is not None and deficit[0] < -MILLIMETRE < deficit.max():
         yield "leg"
 
 
 def _short(name: str) -> str:
-    """A name without its side: both sides bind alike more often than not. Of four legs it says which pair."""
+    """Return a name without its side: both sides bind alike more often than not. Of four legs the pair is named."""
     name = name.removesuffix("_motor").removesuffix("_joint")
     side, _, rest = name.partition("_")
     if not rest or side.lower() not in SIDES:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import matrices_of_quaternions
 from ...mathematics.whole_body_motion import MotionTerms
@@ -21,12 +20,13 @@ from ...robots.description import RobotDescription
 from ..models.euler_angles import coordinates_of, pose_of, twist_of
 from ..models.exact_dynamics import (
     ExactDynamics,
-    Stretch,
+    Segment,
     dynamics_of,
     half_steps,
     joint_motions,
     rotation_between,
 )
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 
 FLIGHT_STEP = 0.002
@@ -92,8 +92,8 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
     lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
     flown = [_flight(plan, lift_off, touchdown) for lift_off, touchdown in flights]
     single = half_steps(plan.position, plan.velocity, plan.time, plan.contact_force, lasting)
-    places, rates = dynamics.follow([*(one.stretch for one in flown), *single])
-    behind = np.cumsum([len(one.stretch.steps) for one in flown])
+    places, rates = dynamics.follow([*(one.segment for one in flown), *single])
+    behind = np.cumsum([len(one.segment.steps) for one in flown])
     errors = tuple(
         (float(np.linalg.norm(places[last - 1, :3] - plan.position[end, :3])),
          float(rotation_between(places[last - 1, 3:7], plan.position[end, 3:7])))
@@ -156,7 +156,7 @@ def flight_knots(plan: PlannedJump) -> tuple[tuple[int, int], ...]:
 class _Flight:
     """A whole flight: time and interval of the end of every step, (n_steps,)."""
 
-    stretch: Stretch
+    segment: Segment
     time: Array
     knot: NDArray[np.int64]
 
@@ -177,11 +177,11 @@ def _flight(plan: PlannedJump, lift_off: int, touchdown: int) -> _Flight:
     of_halves = np.concatenate([[lift_off], np.repeat(knots, 2)])
     joints = joint_motions(plan.position, plan.velocity, plan.time, of_halves)
     angles, speeds, _ = joints.at(np.concatenate(passed)[:, None])
-    stretch = Stretch(
+    segment = Segment(
         plan.position[lift_off, :7], plan.velocity[lift_off, :6], angles, speeds,
         np.zeros(plan.contact_force.shape[1:]), np.concatenate(steps),
     )  # fmt: skip
-    return _Flight(stretch, np.concatenate(times), np.array(knots))
+    return _Flight(segment, np.concatenate(times), np.array(knots))
 
 
 def held_joints(plan: PlannedJump, k: int) -> NDArray[np.bool_]:
@@ -196,8 +196,9 @@ def _defects(
     plan: PlannedJump, impacts: dict[int, tuple[Array, Array]], lasting: NDArray[np.int64],
     places: Array, rates: Array,
 ) -> Array:  # fmt: skip
-    """How far exact dynamics from each knot misses the next, see ``Replay``; ``places`` and ``rates`` are
-    the ends of the lasting intervals."""
+    """Return the distances by which exact dynamics from each knot miss the next, see ``Replay``; ``places`` and
+    ``rates`` are the ends of the lasting intervals.
+    """
     reached, moving = plan.position[:-1, :7].copy(), plan.velocity[:-1, :6].copy()
     reached[lasting], moving[lasting] = places[:, :7], rates[:, :6]
     for k, (behind, _) in impacts.items():
@@ -243,7 +244,7 @@ def _sample(
 
 
 def midpoint_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> tuple[Array, Array]:
-    """What is left over of the planner's own equations in every interval, zero at impacts.
+    """Return the residuals of the planner's own equations in every interval, zero at impacts.
 
     The ``full`` formulation holds accelerations of its coordinates constant over an interval and
     fulfils the equations of motion in its middle. Exact dynamics evaluates these anew.

@@ -49,14 +49,14 @@ class PlanTest:
 
 @dataclass(frozen=True)
 class ValidityReport:
-    """All tests of one plan, and ``figures``: what the plan does and how hard, with their units."""
+    """Tests of one plan, and ``figures``: its performance and loads, with their units."""
 
     tests: tuple[PlanTest, ...]
     figures: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def valid(self) -> bool:
-        """Whether every test passed."""
+        """True if every test passed."""
         return all(test.passed for test in self.tests)
 
     @property
@@ -73,7 +73,7 @@ class ValidityReport:
         }
 
     def explain(self) -> str:
-        """One line for every test that failed."""
+        """Return one line for every test that failed."""
         return "\n".join(
             f"{test.name}: {test.text} is {test.value:.4g} {test.unit}, at most {test.limit:.4g} "
             f"{test.unit} is allowed{f' ({test.where})' if test.where else ''}"
@@ -125,8 +125,8 @@ def require_valid(plan: PlannedJump, robot: RobotDescription) -> None:
         )
 
 
-def why_not(error: Exception) -> str:
-    """What binds where a task has no valid plan, in a few words, from what the planner raised."""
+def failure_text(error: Exception) -> str:
+    """Return what binds where a task has no valid plan, in a few words, from what the planner raised."""
     if isinstance(error, InvalidPlanError):
         return ", ".join(t["name"] for t in error.plan.report["tests"] if not t["passed"])
     if isinstance(error, JumpTaskError):
@@ -135,7 +135,7 @@ def why_not(error: Exception) -> str:
 
 
 def broken_array(plan: PlannedJump, robot: RobotDescription) -> str:
-    """What is wrong with the arrays themselves; empty where nothing is."""
+    """Return the fault of the arrays themselves; empty where there is none."""
     knots, joints = len(plan.time), len(robot.joints)
     shapes: dict[str, tuple[int, ...]] = {
         "time": (knots,),

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...plotting import (
     COLOURS,
@@ -31,6 +30,7 @@ from ..checking.evidence import Evidence
 from ..checking.plan_tests import allowed_motor_torque
 from ..checking.replay import replay
 from ..models.link_shapes import legs
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 POSTURES = 9
-"""How many postures are shown."""
+"""Number of postures shown."""
 COLUMNS = 3
 WIDTH, POSTURES_HEIGHT, PANEL_HEIGHT = 14.0, 2.9, 2.3
 """The picture's width, and the heights of the row of postures and of a row of panels [inch]."""
@@ -122,7 +122,7 @@ def draw_postures(axes: Axes, plan: PlannedJump, robot: RobotDescription) -> Non
 
 
 def posture_times(plan: PlannedJump) -> Array:
-    """Instants [s] that show the whole motion: more of them about the thrust and in the flight."""
+    """Return the instants [s] that show the whole motion: more of them about the thrust and in the flight."""
     if plan.later_flights:
         return np.linspace(0.0, plan.time[-1], POSTURES)
     lift_off, touchdown = plan.lift_off_time, plan.touchdown_time
@@ -145,7 +145,7 @@ MOST_SHARE = 150.0
 
 
 def plan_panels(e: Evidence) -> list[Panel]:
-    """All panels of a plan, three in a row; the last row says what x is."""
+    """Return all panels of a plan, three in a row; the last row labels x."""
     shades = phases_of(e.plan)
     rows = [
         com_lines(e.plan), velocity_lines(e.plan), momentum_lines(e.plan),
@@ -160,7 +160,7 @@ def plan_panels(e: Evidence) -> list[Panel]:
 
 
 def phases_of(plan: PlannedJump) -> list[Shade]:
-    """From when to when each phase lasts [s], with its name."""
+    """Return the start and end of each phase [s], with its name."""
     changes = np.flatnonzero(np.diff(plan.phase)) + 1
     starts = np.concatenate([[0], changes])
     ends = np.append(changes, len(plan.time) - 1)
@@ -202,7 +202,7 @@ def force_lines(e: Evidence) -> tuple[str, list[Curve]]:
 
 
 def friction_lines(e: Evidence) -> tuple[str, list[Curve]]:
-    """How much of its friction cone the force on every contact point uses; no line without force."""
+    """Return the share of its friction cone that the force on every contact point uses; no line without force."""
     time, k = _interval_ends(e.plan)
     force = e.plan.contact_force[k]
     up = force[:, :, 2]
@@ -251,7 +251,7 @@ def torque_share_lines(e: Evidence) -> tuple[str, list[Curve]]:
 
 
 def speed_lines(e: Evidence) -> tuple[str, list[Curve]]:
-    """Motor speeds as shares of the speed without load."""
+    """Return the motor speeds as shares of the speed without load."""
     share = np.abs(e.motor_speed) / e.plan.task.equipped(e.robot).motors.no_load_speed
     return "motor speed [% of the no-load speed]", _motor_lines(e, 100.0 * share)
 

@@ -1,4 +1,4 @@
-"""What a robot has learnt from its own jumps, kept in a small file that belongs to this robot.
+"""Lessons of a robot's own jumps, kept in a small file that belongs to this robot.
 
 After each jump the recording says how far it landed from its place, and how the torso tilted. From this
 follows the correction of velocity and angular momentum at lift-off that this jump would have needed
@@ -36,9 +36,9 @@ SHARED = 0.7
 NEAR, FAR = 0.25, 1.5
 """Launches that differ by less than this [m/s] are the same jump, and are alike."""
 NOISE = 0.5
-"""How much one lesson scatters, as a share of what robots need."""
+"""Scatter of one lesson, as a share of what robots need."""
 FORGETTING = 0.9
-"""With each further jump a lesson counts as if its noise had grown by this share's inverse."""
+"""Factor by whose inverse a lesson's variance of noise grows with each further jump."""
 MOST = 40
 """Lessons that are kept, the last ones."""
 LARGEST = 0.15
@@ -90,25 +90,26 @@ class LearntJumps:
         launches = np.array([lesson.launch for lesson in self.lessons])
         needed = np.array([lesson.velocity + lesson.momentum for lesson in self.lessons])
         ages = np.arange(len(launches))[::-1]
-        gram = likeness(launches[:, None] - launches) + np.diag(NOISE**2 / FORGETTING**ages)
-        weights = product(inverse(gram), likeness(launches - np.array(launch)))
+        gram = similarity(launches[:, None] - launches) + np.diag(NOISE**2 / FORGETTING**ages)
+        weights = product(inverse(gram), similarity(launches - np.array(launch)))
         x, y, z, kx, ky, kz = product(weights, needed).round(5).tolist()
         return (x, y, z), (kx, ky, kz)
 
     def with_lesson(self, lesson: Lesson) -> LearntJumps:
-        """These and one more; more than ``MOST`` are not kept."""
+        """Return these and one more; more than ``MOST`` are not kept."""
         return LearntJumps(self.robot, (*self.lessons, lesson)[-MOST:])
 
 
-def likeness(differences: Any) -> Any:
-    """How much launches with these differences (..., 4) have in common, from 0 to 1."""
+def similarity(differences: Any) -> Any:
+    """Return the similarity of launches with these differences (..., 4), from 0 to 1."""
     square = -0.5 * (differences**2).sum(axis=-1)
     return SHARED * np.exp(square / FAR**2) + (1.0 - SHARED) * np.exp(square / NEAR**2)
 
 
 def launch_of(task: JumpTask) -> Launch | None:
-    """What a task means at lift-off, by the first jump of a row; ``None`` for somersaults and rows of jumps
-    that differ."""
+    """Return the launch of a task at lift-off, by the first jump of a row; ``None`` for somersaults and rows of jumps
+    that differ.
+    """
     hops, end = task.hops(), task.places()[1]
     hop = hops[0]
     if hop.rotation or any(other != hop for other in hops):
@@ -127,7 +128,7 @@ def launch_of(task: JumpTask) -> Launch | None:
 
 
 def read_learnt(path: Path, robot: str) -> LearntJumps:
-    """What a robot has learnt.
+    """Return the lessons of a robot.
 
     Raises:
         LearntFileError: there is no such file, it is damaged, or is another robot's.

@@ -59,24 +59,25 @@ SCALES = {
     "thrust_time": 0.1, "flight_time": 0.1, "landing_time": 0.2, "contact_time": 0.2, "effort": 0.1, "friction": 0.2,
     "foot_clearance": 0.02, "leg_clearance": 0.02,
 }  # fmt: skip
-"""How much of each parameter [its unit] is a distance of 1 between two tasks."""
+"""Change of each parameter [its unit] that counts as a distance of 1 between two tasks."""
 
 ALIKE = 2.0
-"""How far apart two tasks may be for the plan of one to say something about the other."""
+"""Greatest distance between two tasks at which the plan of one is evidence for the other."""
 
 Solver = Callable[[JumpTask, RobotDescription, PlannedJump | None], PlannedJump]
-"""Makes a plan of a task, starting from another plan where one is given."""
+"""Maker of a plan of a task, from another plan where one is given."""
 
 
 def user_folder() -> Path:
-    """Where a user's own plans are kept."""
+    """Return the folder of a user's own plans."""
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     return Path(home) / "aloft" / "plans"
 
 
 def task_distance(first: JumpTask, second: JumpTask) -> float | None:
-    """How far apart two tasks are, in units of ``SCALES``; ``None`` where one cannot start from
-    the other, because something else than those parameters differs."""
+    """Return the distance between two tasks, in units of ``SCALES``; ``None`` where one cannot start from the other,
+    because something else than those parameters differs.
+    """
     alike = set(JumpTask.model_fields) - {"name", "recipe", *SCALES}
     if any(getattr(first, name) != getattr(second, name) for name in alike):
         return None
@@ -96,8 +97,7 @@ def _scaled_distance(first: Mapping[str, Any], second: Mapping[str, Any]) -> flo
 
 
 def _other_parameters(task: Mapping[str, Any]) -> dict[str, Any]:
-    """Of a task as plain data what must be the same for a start from its plan; what says nothing is
-    left out."""
+    """Return what must be the same in a task, as plain data, for a start from its plan; absent values are left out."""
     given = {name: x for name, x in task.items() if name not in {"name", "recipe", *SCALES}}
     left: dict[str, Any] = _without_none(given)
     return left
@@ -122,7 +122,7 @@ def readable_name(name: str) -> str:
 
 
 def names_of(robot: RobotDescription) -> dict[str, list[str]]:
-    """What a plan's file calls its columns."""
+    """Return the names of the columns in a plan's file."""
     return {
         "joints": [joint.name for joint in robot.joints],
         "feet": [foot.name for foot in robot.feet],
@@ -152,7 +152,7 @@ class PlanLibrary:
 
     @property
     def folders(self) -> tuple[Path, ...]:
-        """Where plans are looked for, in that order."""
+        """Folders that are searched for plans, in that order."""
         return self._folders
 
     def path_of(self, task: JumpTask) -> Path | None:
@@ -206,8 +206,9 @@ class PlanLibrary:
             ) from error
 
     def load_of(self, task: JumpTask) -> dict[str, float] | None:
-        """What the kept plan of a task asks of the motors, as ``motor_load`` has it; ``None`` where there is no
-        such plan or its file is damaged. Nothing else of the file is read."""
+        """Return the motor load of a task's kept plan, as ``motor_load`` has it; ``None`` where there is no such plan
+        or its file is damaged. Nothing else of the file is read.
+        """
         path = self.path_of(task)
         if path is None:
             return None
@@ -252,9 +253,9 @@ class PlanLibrary:
         return None
 
     def farthest(self, task: JumpTask, parameter: str, modest: float) -> PlannedJump | None:
-        """Of the valid plans of tasks like this one but for ``parameter``, which lies between
-        ``modest`` and what the task says, the one that goes farthest; other parameters may be
-        ``ALIKE`` apart."""
+        """Return the valid plan that goes farthest among those of tasks like this one but for ``parameter``, which lies
+        between ``modest`` and the task's value; other parameters may be ``ALIKE`` apart.
+        """
         asked = getattr(task, parameter)
         found = []
         for path, header in self.headers():
@@ -333,12 +334,12 @@ class PlanLibrary:
             InvalidPlanError: it can, but the plan fails the validity check; it is not kept.
         """
         from ..checking.validity import InvalidPlanError
-        from .once import require_valid_once
+        from .validation_cache import require_valid_cached
 
         kept = None if anew else self.find(task)
         if kept is not None:
             try:
-                require_valid_once(kept, self.robot)
+                require_valid_cached(kept, self.robot)
             except InvalidPlanError:
                 path = self.path_of(task)
                 if path is None or path.parent != user_folder():
@@ -398,7 +399,7 @@ def solve_and_check(
         JumpTaskError, PlanError, InvalidPlanError: as ``PlanLibrary.plan``.
     """
     from ..checking.validity import checked, require_valid
-    from ..solving.solve import ROUNDS, curable
+    from ..solving.solve import ROUNDS, relaxable
     from ..task.read_task import require_consistent
 
     require_consistent(task, robot)
@@ -413,7 +414,7 @@ def solve_and_check(
                 return plan
     plan = checked(make(task, robot, None), robot)
     for _ in range(ROUNDS if refine else 0):
-        if plan.valid or not curable(plan):
+        if plan.valid or not relaxable(plan):
             break
         try:
             plan = checked(make(task, robot, plan), robot)

@@ -27,10 +27,9 @@ MOST_SECONDS, LEAST_SECONDS = 6.0, 2.0
 ALTOGETHER = 8.5
 """s of processor time after which no further solve is begun, with what the task itself took."""
 STRIDES, FIRST_STRIDES = 8, 4
-"""Into so many steps the way to what is asked for is divided at least, from a kept plan's value and from
-a modest one."""
+"""Least numbers of steps on the way to the wanted values, from a kept plan's value and from a modest one."""
 SINGLE = 2
-"""So many parameters are changed on their own before all are changed together."""
+"""Number of parameters that are changed on their own before all are changed together."""
 TOGETHER = ("rise", "take_off_speed", "distance_x", "distance_y", "twist", "landing_height")
 UPWARDS = ("rise", "take_off_speed", "landing_height")
 SHARES = 20
@@ -78,12 +77,12 @@ FIRST = {
     "ground clearance": ("foot_clearance", "landing_height"),
     "leg clearance": ("twist", "leg_clearance"),
 }
-"""By constraint family, which parameters are tried first."""
+"""Parameters that are tried first, by constraint family."""
 
 
 @dataclass(frozen=True)
 class NearestFeasible:
-    """What was found.
+    """Nearest task that can be planned.
 
     Attributes:
         parameter: which one was changed.
@@ -157,9 +156,10 @@ def nearest_feasible(
 
 
 def continuation_path(task: JumpTask) -> list[list[dict[str, float]]]:
-    """From a modest jump to what is asked for: onto a step with its height and the rise only, as
-    the robot cannot jump up close to a step; then with all parameters that say how far it goes.
-    Empty where the task sets fewer than two of them to something else."""
+    """Return the way from a modest jump to the wanted one: onto a step with its height and the rise only, as the robot
+    cannot jump up close to a step; then with all parameters that set how far it goes. Empty where the task sets fewer
+    than two of them to something else.
+    """
     far = [name for name in TOGETHER if name in AXES and len(values_towards(task, name)) > 1]
     up = [name for name in far if name in UPWARDS] if task.landing_height > 0.0 else []
     groups = [names for names in (up, far) if len(names) > 1]
@@ -180,7 +180,7 @@ def _way(task: JumpTask, names: list[str]) -> list[dict[str, float]]:
 
 
 def seconds_left(spent: float) -> float:
-    """How long a search may take [s] after a task that took so much processor time [s]."""
+    """Return the time that a search may take [s] after a task that took so much processor time [s]."""
     return max(LEAST_SECONDS, min(MOST_SECONDS, ALTOGETHER - spent))
 
 
@@ -198,8 +198,9 @@ def candidates(task: JumpTask, family: str) -> list[str]:
 
 
 def values_towards(task: JumpTask, parameter: str) -> list[float]:
-    """From the modest value to what is asked for, in round steps; empty where the task leaves the
-    parameter as it is."""
+    """Return the values from the modest to the wanted one, in round steps; empty where the task leaves the parameter as
+    it is.
+    """
     asked, axis = getattr(task, parameter), AXES[parameter]
     if asked is None or asked == JumpTask.model_fields[parameter].default:
         return []
@@ -252,12 +253,13 @@ class _FeasibleSearch:
 
     @property
     def spent(self) -> bool:
-        """Whether no further solve is begun."""
+        """True if no further solve is begun."""
         return self._solves >= MOST_SOLVES or self.cpu > self._seconds
 
     def along(self, way: list[dict[str, float]]) -> NearestFeasible | None:
-        """The best point of a way from modest values to what is asked for; ``None`` where even the
-        modest one has no plan, or no time is left to try it."""
+        """Return the best point of a way from modest to the wanted values; ``None`` where even the modest one has no
+        plan, or no time is left to try it.
+        """
         begin, plan = self._kept(way)
         if plan is None:
             begin = 0

@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.rotations import matrices_of_quaternions
@@ -40,6 +39,7 @@ from ..models.exact_dynamics import (
     dynamics_of,
     joint_motions,
 )
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from .jump_table import JumpTable
 
@@ -109,7 +109,7 @@ def reference_table(
 
 
 def _later_jumps(plan: PlannedJump, stand_time: float) -> Iterator[tuple[float, float, float]]:
-    """When thrust, flight and landing of the jumps behind the first begin."""
+    """Yield when thrust, flight and landing of the jumps behind the first begin."""
     for before, (lift_off, touchdown) in zip(
         plan.touchdown_times, plan.later_flights, strict=False
     ):
@@ -120,7 +120,7 @@ def _later_jumps(plan: PlannedJump, stand_time: float) -> Iterator[tuple[float, 
 
 
 def _contacts(plan: PlannedJump, intervals: NDArray[np.int64]) -> NDArray[np.bool_] | None:
-    """By row which points carry load, where it is not always all of them or none."""
+    """Return by row which points carry load, where it is not always all of them or none."""
     if np.all(plan.contact == (plan.phase != Phase.FLIGHT)[:, None]):
         return None
     return np.concatenate([plan.contact[[0, 0]], plan.contact[intervals]])
@@ -165,8 +165,9 @@ def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, fl
 def _between(
     plan: PlannedJump, dynamics: ExactDynamics, knot: NDArray[np.int64], passed: Array
 ) -> tuple[Array, Array, Array]:
-    """Pinocchio's q and v at those times (n, 1) since knots, and the accelerations of ``_States``: the cubics of
-    base position, Euler angles and joints between two knots."""
+    """Return Pinocchio's q and v at those times (n, 1) since knots, and the accelerations of ``_States``: the cubics of
+    base position, Euler angles and joints between two knots.
+    """
     angles = euler_angles(plan.position[:, 3:7])
     turns = matrices_of_quaternions(plan.position[:, 3:7])
     places = np.hstack([plan.position[:, :3], angles])
@@ -188,8 +189,9 @@ def _between(
 
 
 def pinocchio_quaternions(pin: Any, turns: Array) -> Array:
-    """Pinocchio's quaternions (n, 4) of rotation matrices (n, 3, 3), with its bits; all with a positive trace, as those
-    of an upright base, at once."""
+    """Return Pinocchio's quaternions (n, 4) of rotation matrices (n, 3, 3), with its bits; all with a positive trace,
+    as those of an upright base, at once.
+    """
     trace = turns[:, 0, 0] + (turns[:, 1, 1] + turns[:, 2, 2])
     root = np.sqrt(np.maximum(trace, 0.0) + 1.0)
     share = 0.5 / root
@@ -205,8 +207,9 @@ def pinocchio_quaternions(pin: Any, turns: Array) -> Array:
 def _middle_values(
     plan: PlannedJump, values: Array, instants: Array, intervals: NDArray[np.int64]
 ) -> Array:
-    """What holds in the middle of the intervals, at instants in those intervals: linear from one middle
-    to the next, never across lift-off or touchdown."""
+    """Return the values in the middle of the intervals at instants in those intervals: linear from one middle to the
+    next, never across lift-off or touchdown.
+    """
     lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
     ends = np.array([knot for flight in flight_knots(plan) for knot in flight])
     found = np.empty((len(instants), *values.shape[1:]))

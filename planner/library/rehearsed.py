@@ -1,4 +1,4 @@
-"""What the rehearsal of a plan has learnt, kept in a small file in a folder of the plan library.
+"""Corrections from the rehearsal of a plan, kept in a small file in a folder of the plan library.
 
 A rehearsal belongs to one plan and one controller. It is kept under hashes of both: the bytes of the
 plan's file, and what ``controller_hash`` says. With another plan or controller it is never found.
@@ -34,7 +34,7 @@ class RehearsalFileError(AloftError):
 
 @dataclass(frozen=True)
 class Deviation:
-    """By how much a robot misses its plan at lift-off, as a mean over several runs.
+    """Error of a robot's lift-off relative to its plan, as a mean over several runs.
 
     Attributes:
         velocity: of the centre of mass, in the plan's axes [m/s].
@@ -67,7 +67,7 @@ class Rehearsed:
 
     @property
     def corrects(self) -> bool:
-        """Whether there is a correction."""
+        """True if there is a correction."""
         return any(self.velocity_correction) or any(self.momentum_correction)
 
 
@@ -111,7 +111,7 @@ def _sources(wires: Any, blocks: Mapping[str, Any]) -> Iterator[str]:
 
 
 def find_rehearsed(library: PlanLibrary, task: JumpTask, controller: str) -> Rehearsed | None:
-    """What was learnt for the kept plan of a task with that controller, or ``None``.
+    """Return the corrections for the kept plan of a task with that controller, or ``None``.
 
     What lies in the library's own folder comes before what is shipped.
 
@@ -144,7 +144,7 @@ def find_rehearsed(library: PlanLibrary, task: JumpTask, controller: str) -> Reh
 
 
 def was_rehearsed(library: PlanLibrary, task: JumpTask) -> bool:
-    """Whether the kept plan of a task was ever rehearsed, with whichever controller."""
+    """Check whether the kept plan of a task was ever rehearsed, with whichever controller."""
     plan = library.path_of(task)
     return plan is not None and any(
         any((folder / FOLDER).glob(f"{plan.stem}.*.json")) for folder in library.folders
@@ -180,7 +180,7 @@ def _hash_of(plan: Path) -> str:
 
 
 def read_vector(values: Any) -> Vector:
-    """Three finite numbers from a file; raises ``ValueError`` or ``TypeError`` for anything else."""
+    """Read three finite numbers from a file; raises ``ValueError`` or ``TypeError`` for anything else."""
     x, y, z = (float(value) for value in values)
     if not all(abs(value) < 1e6 for value in (x, y, z)):
         raise ValueError(f"{values} is not finite")

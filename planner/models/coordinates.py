@@ -62,12 +62,12 @@ class Coordinates:
 
     @cached_property
     def free_base(self) -> tuple[int, ...]:
-        """Which of the base's six coordinates are reduced coordinates: these come first."""
+        """Indices of the base's six coordinates that are reduced coordinates: these come first."""
         return tuple(int(i) for i in range(6) if np.any(self.matrix[i]))
 
     @cached_property
     def turning(self) -> tuple[int, ...]:
-        """Which of the reduced coordinates are angles of the base."""
+        """Indices of the reduced coordinates that are angles of the base."""
         return tuple(i for i, axis in enumerate(self.free_base) if axis >= 3)
 
     def expand(self, reduced: Any) -> Any:
@@ -93,12 +93,12 @@ class Coordinates:
         return np.asarray(np.linalg.pinv(self.force_matrix).T)
 
     def contains(self, whole: Array) -> bool:
-        """Whether these positions (..., n_velocities) are ones that the coordinates can take."""
+        """Check whether the coordinates can take these positions (..., n_velocities)."""
         return bool(np.allclose(self.reduce(whole) @ self.matrix.T, whole, rtol=0.0, atol=1e-12))
 
 
 def full_coordinates(model: SymbolicModel) -> Coordinates:
-    """Everything moves on its own."""
+    """Return coordinates in which everything moves on its own."""
     contacts = len(model.robot.contacts)
     return Coordinates(
         "full", np.eye(model.size), tuple(range(len(model.limbs))), 1, tuple(range(6)),
@@ -108,14 +108,16 @@ def full_coordinates(model: SymbolicModel) -> Coordinates:
 
 
 def sagittal_coordinates(model: SymbolicModel) -> Coordinates | None:
-    """Motion in the sagittal plane: the joints about y move, left and right alike, and all others
-    keep their zero; ``None`` if the robot is not the same left and right."""
+    """Return coordinates of motion in the sagittal plane: the joints about y move, left and right alike, and all others
+    keep their zero; ``None`` if the robot is not the same left and right.
+    """
     return _mirrored(model, "sagittal")
 
 
 def mirrored_coordinates(model: SymbolicModel) -> Coordinates | None:
-    """Motion that is the same left and right, with all joints of the computed limbs; ``None`` if
-    the robot is not the same left and right."""
+    """Return coordinates of motion that is the same left and right, with all joints of the computed limbs; ``None`` if
+    the robot is not the same left and right.
+    """
     return _mirrored(model, "mirrored")
 
 

@@ -40,7 +40,7 @@ def euler_rates(angles: Array, angular_velocity: Array) -> Array:
 
 
 def rotation(angles: Array) -> Array:
-    """Ry Rx Rz, from body to world, (..., 3, 3)."""
+    """Return Ry Rx Rz, from body to world, (..., 3, 3)."""
     (cx, cy, cz), (sx, sy, sz) = _parts(np.cos(angles)), _parts(np.sin(angles))
     turns = np.zeros((3, *angles.shape, 3))
     turns[0, ..., 0, 0] = turns[1, ..., 1, 1] = turns[2, ..., 2, 2] = 1.0
@@ -51,13 +51,13 @@ def rotation(angles: Array) -> Array:
 
 
 def angular_motion(angles: Array, rates: Array, accelerations: Array) -> tuple[Array, Array]:
-    """Angular velocity [rad/s] and acceleration [rad/s^2] in the body frame, all (..., 3)."""
+    """Return the angular velocity [rad/s] and acceleration [rad/s^2] in the body frame, all (..., 3)."""
     x, _, z = _parts(angles)
     (p, q, r), (a, b, c) = _parts(rates), _parts(accelerations)
     sine, cosine = np.sin(x), np.cos(x)
 
     def back(u: Array, v: Array, w: Array) -> Array:
-        """Rz' of a vector."""
+        """Return Rz' of a vector."""
         return np.stack([np.cos(z) * u + np.sin(z) * v, -np.sin(z) * u + np.cos(z) * v, w], axis=-1)
 
     turning = back(p, q * cosine, -q * sine)
@@ -79,7 +79,7 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def times(matrices: Array, vectors: Array) -> Array:
-    """Matrices (..., 3, 3) times vectors (..., 3)."""
+    """Multiply matrices (..., 3, 3) by vectors (..., 3)."""
     return np.asarray(np.add.reduce(matrices * vectors[..., None, :], axis=-1))
 
 

@@ -36,7 +36,7 @@ from ..task.scaling import per_robot
 from .euler_angles import cross, times, times_transposed
 
 WHOLE = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]
-"""Where the parts xx, yy, zz, xy, xz, yz of an inertia stand in its matrix."""
+"""Places of the parts xx, yy, zz, xy, xz, yz of an inertia in its matrix."""
 KEPT_CALLS = 32
 """Calls whose memory is kept: as many numbers of instants."""
 Motion = tuple[Array, Array, Array]
@@ -59,8 +59,9 @@ class JointMotion(NamedTuple):
     duration: float | Array
 
     def at(self, time: float | Array) -> Motion:
-        """Angles, velocities and accelerations [rad] at ``time`` since the first knot [s]; at n
-        times (n, 1) each is (n, n_joints)."""
+        """Return the angles, velocities and accelerations [rad] at ``time`` since the first knot [s]; at n times (n, 1)
+        each is (n, n_joints).
+        """
         t, u = self.duration, time / self.duration
         way = self.end - self.start
         bend = 3.0 * way - t * (2.0 * self.start_velocity + self.end_velocity)
@@ -70,7 +71,7 @@ class JointMotion(NamedTuple):
         return position, velocity, (2.0 * bend + 6.0 * u * twist) / (t * t)
 
 
-class Stretch(NamedTuple):
+class Segment(NamedTuple):
     """Motion over some steps under constant contact forces.
 
     Attributes:
@@ -90,9 +91,10 @@ class Stretch(NamedTuple):
 
 
 class FeetStates(NamedTuple):
-    """Of n states the centre of mass, its velocity and the angular momentum about it (n, 3), the contact points
-    (n, n_contacts, 3), sole centres and their velocities (n, n_feet, 3), of balls the lowest points, and the
-    feet's yaw and pitch [rad] (n, n_feet)."""
+    """States of the feet in n states: the centre of mass, its velocity and the angular momentum about it (n, 3), the
+    contact points (n, n_contacts, 3), sole centres and their velocities (n, n_feet, 3), of balls the lowest points, and
+    the feet's yaw and pitch [rad] (n, n_feet).
+    """
 
     com: Array
     com_velocity: Array
@@ -148,8 +150,7 @@ class ExactDynamics:
         return found
 
     def contact_jacobians(self, q: Array) -> tuple[Array, Array]:
-        """Contact points (n_contacts, 3) and their Jacobians (3 n_contacts, n_velocities), world
-        axes."""
+        """Return the contact points (n_contacts, 3) and their Jacobians (3 n_contacts, n_velocities), world axes."""
         pin = self.pin
         points = self.evaluated_points(q)
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -167,7 +168,7 @@ class ExactDynamics:
         return points, np.vstack(found)
 
     def evaluated_points(self, q: Array) -> Array:
-        """As ``points``, of a state whose Jacobians are evaluated as well."""
+        """Return the result of ``points``, with the state's Jacobians evaluated as well."""
         self.pin.computeJointJacobians(self.model, self.data, q)
         self.pin.updateFramePlacements(self.model, self.data)
         return self._contact_places()
@@ -185,9 +186,9 @@ class ExactDynamics:
         return self.sole_places(), self.foot_angles()[0]
 
     def footholds(self, heading: float = 0.0) -> Array:
-        """What stays in place while the contact points stand on the ground, in the state that was
-        evaluated last, (n_contacts, 3), in a stance of that ``heading`` [rad]; see
-        ``SymbolicModel.footholds``."""
+        """Return the places that stay fixed while the contact points stand on the ground, in the state that was
+        evaluated last, (n_contacts, 3), in a stance of that ``heading`` [rad]; see ``SymbolicModel.footholds``.
+        """
         places = self._contact_places()
         cosine, sine = math.cos(heading), math.sin(heading)
         for ball in self.balls:
@@ -198,7 +199,7 @@ class ExactDynamics:
         return places
 
     def joint_places(self, q: Array) -> Array:
-        """Where the joints are in the world [m], (n_joints, 3)."""
+        """Return the places of the joints in the world [m], (n_joints, 3)."""
         self.pin.forwardKinematics(self.model, self.data, q)
         places = [self.data.oMi[joint].translation for joint in range(2, self.model.njoints)]
         return np.array(places).reshape(-1, 3)
@@ -211,7 +212,7 @@ class ExactDynamics:
         return places
 
     def feet(self, position: Array, velocity: Array) -> FeetStates:
-        """What a reference of the controller says of n states."""
+        """Return what a reference of the controller holds of n states."""
         pin, model, data = self.pin, self.model, self.data
         axes, count, feet = (
             pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
@@ -253,8 +254,9 @@ class ExactDynamics:
         return found
 
     def foot_angles(self) -> tuple[Array, Array]:
-        """Heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated
-        last. A ball has none of its own: it has the base's heading and no pitch."""
+        """Return the heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated last. A ball
+        has none of its own: it has the base's heading and no pitch.
+        """
         turns = [self.data.oMf[frame].rotation for frame in self.sole_frames]
         yaw, pitch = self._angles(
             np.array(turns).reshape(1, -1, 3, 3), np.array(self.data.oMi[1].rotation)[None]
@@ -286,7 +288,7 @@ class ExactDynamics:
         return np.array(self.pin.centerOfMass(self.model, self.data, q))
 
     def centroidal(self, q: Array, v: Array) -> tuple[Array, Array, Array]:
-        """Centre of mass [m], its velocity [m/s] and the angular momentum about it [N m s]."""
+        """Return the centre of mass [m], its velocity [m/s] and the angular momentum about it [N m s]."""
         momentum = self.pin.computeCentroidalMomentum(self.model, self.data, q, v)
         com = np.array(self.data.com[0])
         return com, np.array(momentum.linear) / self.mass, np.array(momentum.angular)
@@ -298,8 +300,9 @@ class ExactDynamics:
         bend: Array | None = None,
         force: Array | None = None,
     ) -> MotionTerms:
-        """What follows from the states (n, n_positions) and (n, n_velocities) of n instants, the joints' accelerations
-        (n, n_joints) and the contact forces (n, n_contacts, 3) [N, world]; both are zero if they are not given.
+        """Return what follows from the states (n, n_positions) and (n, n_velocities) of n instants, the joints'
+        accelerations (n, n_joints) and the contact forces (n, n_contacts, 3) [N, world]; both are zero if they are not
+        given.
 
         The torques are those of the joints with their rotors, without friction. The points are the contact
         points and behind them the sole centres.
@@ -307,7 +310,7 @@ class ExactDynamics:
         return self._evaluate(self._fixed, position, velocity, bend, force)
 
     def link_poses(self, position: Array) -> LinkPoses:
-        """Where the links are in n states (n, n_positions), the base first."""
+        """Return the poses of the links in n states (n, n_positions), the base first."""
         place = np.zeros((len(position), len(self._links), 3))
         rotation = np.zeros((*place.shape[:2], 9))
         run_compiled(
@@ -363,7 +366,9 @@ class ExactDynamics:
         return terms.com[0], terms.inertia[0][WHOLE]
 
     def _at_origin(self, angles: Array, speeds: Array) -> MotionTerms:
-        """What the joints' motion says, both (n, n_joints), in the base's axes. Of balls the points are the centres."""
+        """Return the terms of the joints' motion, both (n, n_joints), in the base's axes. Of balls the points are the
+        centres.
+        """
         position, velocity = (
             np.zeros((len(angles), self.model.nq)),
             np.zeros((len(angles), self.model.nv)),
@@ -380,8 +385,9 @@ class ExactDynamics:
     def base_residual(
         self, position: Array, velocity: Array, acceleration: Array, force: Array
     ) -> Array:
-        """What is left over of the base's six equations of motion [N or N m, its axes], (n, 6), at n instants with
-        accelerations (n, n_velocities), the base's in its axes."""
+        """Return the residual of the base's six equations of motion [N or N m, its axes], (n, 6), at n instants with
+        accelerations (n, n_velocities), the base's in its axes.
+        """
         terms = self.motion(position, velocity, acceleration[:, 6:], force)
         turn = matrices_of_quaternions(position[:, 3:7])
         missed = acceleration[:, :6] - terms.base
@@ -396,7 +402,7 @@ class ExactDynamics:
         return found
 
     def _pushed(self, q: Array, force: Array) -> Array:
-        """J' F: the generalised force of the contacts."""
+        """Return J' F, the generalised force of the contacts."""
         pushed = np.zeros(self.model.nv)
         if not force.any():
             return pushed
@@ -438,24 +444,24 @@ class ExactDynamics:
         count = max(1, int(np.ceil(duration / longest_step - 1e-9)))
         h = duration / count
         angles, speeds, _ = joints.at(np.asarray(0.5 * h * np.arange(2 * count + 1)[:, None]))
-        stretch = Stretch(q[:7], v[:6], angles, speeds, force, np.full(count, h))
-        places, rates = self.follow([stretch])
+        segment = Segment(q[:7], v[:6], angles, speeds, force, np.full(count, h))
+        places, rates = self.follow([segment])
         return [(h * (i + 1), places[i], rates[i]) for i in range(count)]
 
-    def follow(self, stretches: list[Stretch]) -> tuple[Array, Array]:
-        """Return the states after every step of all stretches in turn: (n_steps, n_positions) and (n_steps,
+    def follow(self, segments: list[Segment]) -> tuple[Array, Array]:
+        """Return the states after every step of all segments in turn: (n_steps, n_positions) and (n_steps,
         n_velocities).
         """
-        angles = np.concatenate([one.angles for one in stretches])
-        speeds = np.concatenate([one.speeds for one in stretches])
-        steps = np.concatenate([one.steps for one in stretches])
-        counts = np.array([len(one.steps) for one in stretches])
+        angles = np.concatenate([one.angles for one in segments])
+        speeds = np.concatenate([one.speeds for one in segments])
+        steps = np.concatenate([one.steps for one in segments])
+        counts = np.array([len(one.steps) for one in segments])
         first = np.concatenate([[0], np.cumsum(counts)])
         of_step = np.repeat(np.arange(len(counts)), counts)
-        force = np.array([one.force for one in stretches])
+        force = np.array([one.force for one in segments])
         base, twist = (
-            np.array([one.base for one in stretches]),
-            np.array([one.twist for one in stretches]),
+            np.array([one.base for one in segments]),
+            np.array([one.twist for one in segments]),
         )
         seen = self._at_origin(angles, speeds)
         starts, ends = (
@@ -540,13 +546,13 @@ def joint_motions(
 
 def half_steps(
     position: Array, velocity: Array, time: Array, force: Array, knots: NDArray[np.int64]
-) -> list[Stretch]:
+) -> list[Segment]:
     """Return the intervals of a plan from its states at some knots, each in two steps."""
     joints = joint_motions(position, velocity, time, knots)
     quarters = np.arange(5)[:, None, None] * (0.25 * joints.duration)
     angles, speeds, _ = joints.at(np.asarray(quarters))
     return [
-        Stretch(
+        Segment(
             position[k, :7], velocity[k, :6], angles[:, i], speeds[:, i], force[k],
             np.full(2, 0.5 * float(time[k + 1] - time[k])),
         )

@@ -34,15 +34,15 @@ class MovingShape:
     rotation: Array
 
     def place(self, point: Vector3) -> Array:
-        """Where a point of the link is (n, 3) [m]."""
+        """Return the place of a point of the link, (n, 3) [m]."""
         return np.asarray(self.position + self.rotation @ np.array(point))
 
     def corners(self) -> Array:
-        """Where the shape's corners are (n_corners, n, 3) [m]."""
+        """Return the places of the shape's corners, (n_corners, n, 3) [m]."""
         return np.array([self.place(corner) for corner in self.shape.corners])
 
     def edges(self) -> list[tuple[Array, Array]]:
-        """Where the ends of its edges are, each (n, 3) [m]; see ``hulls.edges``."""
+        """Return the ends of its edges, each (n, 3) [m]; see ``hulls.edges``."""
         return [(self.place(start), self.place(end)) for start, end in edges(self.shape)]
 
 
@@ -89,8 +89,9 @@ def gaps_between(some: Sequence[MovingShape], others: Sequence[MovingShape]) -> 
 
 
 def _fill_gaps(one: MovingShape, other: MovingShape, out: Array) -> None:
-    """The distances (n,) [m] between two shapes, of which one at least is a hull; as far as ``FAR`` those of balls
-    around them will do."""
+    """Compute the distances (n,) [m] between two shapes, of which one at least is a hull; as far as ``FAR`` those of
+    balls around them will do.
+    """
     import coal
 
     (a, to_a, reach_a), (b, to_b, reach_b) = _solid(one.shape), _solid(other.shape)
@@ -110,7 +111,7 @@ def _middle(shape: Shape) -> Vector3:
 
 @lru_cache(maxsize=512)
 def _solid(shape: Shape) -> tuple[Any, Any, float]:
-    """Coal's shape, where its frame is in the link's, and how far it reaches from the middle of its corners [m]."""
+    """Return Coal's shape, the place of its frame in the link's, and its reach from the middle of its corners [m]."""
     import coal
 
     middle = np.array(_middle(shape))
@@ -123,10 +124,11 @@ def _solid(shape: Shape) -> tuple[Any, Any, float]:
     return solid, coal.Transform3s(turn, middle), reach
 
 
-def lacking(gaps: Array, wanted: float, at: int, *, carried: bool = False) -> Array:
-    """By how much [m] any of the pairs is closer than ``wanted``, or than at the instant ``at`` where it is closer
-    then, the worst at each instant (n,). Pairs of a link and the one that it is ``carried`` by which are that close
-    at ``at`` form the joint between them, and do not count."""
+def clearance_deficit(gaps: Array, wanted: float, at: int, *, carried: bool = False) -> Array:
+    """Return the distance [m] by which any of the pairs is closer than ``wanted``, or than at the instant ``at`` where
+    it is closer then, the worst at each instant (n,). Pairs of a link and the one that it is ``carried`` by which are
+    that close at ``at`` form the joint between them, and do not count.
+    """
     then = gaps[:, at : at + 1]
     short = np.minimum(wanted, then) - gaps
     if carried:

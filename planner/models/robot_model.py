@@ -20,15 +20,15 @@ from .symbolic_model import SymbolicModel
 from .symmetry import Pair, mirrored_pairs, symmetrised, symmetrised_angles
 
 HARD, HARD_TURN = 40.0, 100.0
-"""m/s^2 and rad/s^2 of a link in a hard jump, gravity included."""
+"""Accelerations of a link in a hard jump, gravity included [m/s^2, rad/s^2]."""
 MATTERS = 0.5
 """Held joints that need less than this share of their motors in such a motion have no constraint."""
 TWIN = 10.0
-"""How many times as far apart as usual the left and right angles of a mirrored twin's pose may be meant to be the same."""
+"""Factor on the tolerance within which the left and right angles of a mirrored twin's pose count as the same."""
 ROUNDED = 6
 """Digits of such an angle."""
 SAME = {"mass": 1.0, "com": (0.0, 0.0, 0.0), "inertia": (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)}
-"""What all links have where only the joints of limbs are compared."""
+"""Properties of all links where only the joints of limbs are compared."""
 
 
 def model_of(robot: RobotDescription) -> tuple[SymbolicModel, StanceFinder]:
@@ -81,7 +81,7 @@ def twin_model_of(robot: RobotDescription) -> tuple[SymbolicModel, StanceFinder]
 
 
 def _matters(load: HeldLoad) -> bool:
-    """Whether a hard jump could need a good part of what the joint's motor can hold: what moves on it may."""
+    """Check whether a hard jump could need a good part of what the joint's motor can hold: what moves on it may."""
     arm = np.linalg.norm(np.array(load.com) - np.array(load.origin))
     torque = load.mass * arm * HARD + max(load.inertia[:3]) * HARD_TURN
     return bool(load.carried) or bool(torque > MATTERS * load.most)
@@ -107,7 +107,7 @@ LEANS = 4
 UNEVEN = 5e-4
 """m; by how much the contact points of a stance may be above or below the ground."""
 LEAN_ROUNDS, LEG_STEPS = 12, 20
-"""Of the search for a stance on ground that leans: of the base's place, and of the legs for each."""
+"""Iterations of the search for a stance on ground that leans: of the base's place, and of the legs for each."""
 REACHED, BALANCED = 1e-12, 1e-10
 """m; what feet miss of such ground at most, and the centre of mass of where it stands on level ground."""
 MOST_PLACED = 64
@@ -122,8 +122,9 @@ class StanceFinder:
     def __init__(
         self, robot: RobotDescription, pairs: Sequence[Pair] = (), loosely: float = 1.0
     ) -> None:
-        """``pairs`` of limbs get the same angles where they are to have almost the same ones; ``loosely`` multiplies
-        what almost means."""
+        """Give ``pairs`` of limbs the same angles where they are to have almost the same ones; ``loosely`` multiplies
+        what almost means.
+        """
         self.robot, self.pairs, self.loosely = robot, tuple(pairs), loosely
         self._body = ExactDynamics(robot)
         self._placed: dict[tuple[bytes, StanceLocation], Stance] = {}
@@ -272,18 +273,19 @@ def _normal(points: Array) -> Array:
 
 
 def _lean(normal: Array) -> Array:
-    """Pitch and roll of the base that make a direction of the body vertical."""
+    """Return the pitch and roll of the base that make a direction of the body vertical."""
     roll = np.arctan2(normal[1], normal[2])
     return np.array([np.arctan2(-normal[0], np.hypot(normal[1], normal[2])), roll])
 
 
 def _base_rotation(q: Array) -> Array:
-    """From body to world of a base with the pitch, roll and yaw of the coordinates ``q``."""
+    """Return the rotation from body to world of a base with the pitch, roll and yaw of the coordinates ``q``."""
     return rotation(q[3:6][ORDER])
 
 
 def _turned(q: Array, heading: float) -> Array:
-    """Pitch, roll, yaw of a base that leans as in the coordinates ``q`` and is then turned by
-    ``heading``."""
+    """Return the pitch, roll and yaw of a base that leans as in the coordinates ``q`` and is then turned by
+    ``heading``.
+    """
     turn = rotation(np.array([0.0, 0.0, heading]))
     return angles_of(turn @ _base_rotation(q))[ORDER]

@@ -82,7 +82,7 @@ def composite_inertia(robot: RobotDescription, start: Stance) -> RigidBody:
 
 
 def ankles(robot: RobotDescription, stance: Stance) -> Array:
-    """Where the ankles are in a stance, in the order of the limbs (n_legs, 3)."""
+    """Return the places of the ankles in a stance, in the order of the limbs (n_legs, 3)."""
     places = ExactDynamics(robot).joint_places(pose_of(stance.coordinates))
     return places[[leg[-1] for leg in limbs_of(robot)[0]]]
 
@@ -92,7 +92,7 @@ QUATERNION = slice(3, 7)
 
 
 def quaternion_product(a: Any, b: Any) -> Any:
-    """Of x, y, z, w."""
+    """Return the product of two quaternions x, y, z, w."""
     import casadi as ca
 
     vector = a[3] * b[:3] + b[3] * a[:3] + ca.cross(a[:3], b[:3])
@@ -130,7 +130,7 @@ def _at_rest_base(model: SymbolicModel, q: Any) -> Any:
 
 
 def com(model: SymbolicModel, q: Any) -> Any:
-    """f_com of equation (r = f_com(q)), world."""
+    """Return f_com of equation (r = f_com(q)), world."""
     import casadi as ca
 
     seen = model.com(_at_rest_base(model, q))
@@ -138,7 +138,7 @@ def com(model: SymbolicModel, q: Any) -> Any:
 
 
 def contact_points(model: SymbolicModel, q: Any) -> list[Any]:
-    """f_contact of equation (c = f_contact(q)): of every contact point, world."""
+    """Return f_contact of equation (c = f_contact(q)): of every contact point, world."""
     import casadi as ca
 
     turn = quaternion_rotation(q[QUATERNION])
@@ -147,7 +147,7 @@ def contact_points(model: SymbolicModel, q: Any) -> list[Any]:
 
 
 def angular_momentum(model: SymbolicModel, q: Any, v: Any) -> Any:
-    """A(q) v, the rows of the centroidal momentum matrix for the angular momentum, world."""
+    """Return A(q) v, the rows of the centroidal momentum matrix for the angular momentum, world."""
     import casadi as ca
 
     # Of the unturned base the rates of pitch, roll and yaw are those about y, x and z. Angular

@@ -137,7 +137,7 @@ class SymbolicModel:
     # Kinematics
 
     def frames(self, q: Expression, limbs: Sequence[int] | None = None) -> dict[str, Any]:
-        """Of every link of the base and those limbs: its rotation to the world and its origin."""
+        """Return the rotation to the world and the origin of every link of the base and those limbs."""
         import casadi as ca
 
         frames = {self.robot.base: (base_rotation(q[3:6]), q[0:3])}
@@ -159,14 +159,15 @@ class SymbolicModel:
         return origin + ca.mtimes(rotation, ca.DM(list(place)))
 
     def contact_points(self, q: Expression, limbs: Sequence[int] | None = None) -> list[Any]:
-        """World positions of the contact points on those limbs, in the description's order; of a
-        ball the lowest point."""
+        """Return the world positions of the contact points on those limbs, in the description's order; of a ball the
+        lowest point.
+        """
         return self._contacts(q, limbs, None)
 
     def footholds(
         self, q: Expression, limbs: Sequence[int] | None = None, heading: Any = (1.0, 0.0)
     ) -> list[Any]:
-        """What stays in place while the contact points on those limbs stand on the ground.
+        """Return the places that stay fixed while the contact points on those limbs stand on the ground.
 
         A ball rolls without slipping, so its lowest point moves by the radius times the turn. What
         stays is the place where it would touch if its link were turned by neither the pitch nor the
@@ -221,8 +222,8 @@ class SymbolicModel:
         forces: dict[str, Expression],
         limbs: Sequence[int] | None = None,
     ) -> tuple[Expression, dict[int, Expression], Expression]:
-        """What must act for the robot to move with accelerations ``a`` under gravity while
-        ``forces`` (contact name -> force on the robot, world) push it.
+        """Return the forces that must act for the robot to move with accelerations ``a`` under gravity while ``forces``
+        (contact name -> force on the robot, world) push it.
 
         Returns:
             the wrench (force, moment about the base's origin; body frame) that the base link needs,
@@ -283,8 +284,9 @@ class SymbolicModel:
     def _touching(
         self, contact: ContactPoint, backs: dict[str, Any], down: Expression, link: str
     ) -> Expression:
-        """Where the ground's force acts, in the frame of the foot's link: a ball's lowest point is
-        found by turning the vertical back from the world to the link."""
+        """Return the point at which the ground's force acts, in the frame of the foot's link: a ball's lowest point is
+        found by turning the vertical back from the world to the link.
+        """
         import casadi as ca
 
         ball = self._balls.get(contact.name)
@@ -339,8 +341,9 @@ class SymbolicModel:
     def _accelerations(
         self, q: Expression, v: Expression, a: Expression, limbs: Sequence[int] | None
     ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-        """Angular velocity, angular acceleration and acceleration of the origin, with gravity's
-        opposite added, of the links of the base and those limbs, each in its own frame."""
+        """Return the angular velocity, angular acceleration and acceleration of the origin, with gravity's opposite
+        added, of the links of the base and those limbs, each in its own frame.
+        """
         import casadi as ca
 
         base = self.robot.base
@@ -373,7 +376,7 @@ class SymbolicModel:
         return spins, turns, pulls
 
     def _body_wrench(self, link: Link, spin: Any, turn: Any, pull: Any) -> Any:
-        """Force and moment about the link's origin that its own mass needs, in its frame."""
+        """Return the force and moment about the link's origin that its own mass needs, in its frame."""
         import casadi as ca
 
         centre = ca.DM(list(link.com))
@@ -387,7 +390,7 @@ class SymbolicModel:
         return ca.vertcat(force, moment)
 
     def _carries(self, link: str, outer: str) -> bool:
-        """Whether ``outer`` hangs on ``link``, or is it."""
+        """Check whether ``outer`` hangs on ``link``, or is it."""
         while outer != self.robot.base:
             if outer == link:
                 return True
@@ -395,7 +398,7 @@ class SymbolicModel:
         return False
 
     def joints_of(self, limbs: Sequence[int] | None) -> list[int]:
-        """Joint indices of those limbs, or of all of them, parents first."""
+        """Return the joint indices of those limbs, or of all of them, parents first."""
         chosen = range(len(self.limbs)) if limbs is None else limbs
         return sorted(index for limb in chosen for index in self.limbs[limb])
 
@@ -409,8 +412,9 @@ class Centroidal(NamedTuple):
 
 
 class _SubtreeMomentum(NamedTuple):
-    """What a link and all that hangs on it have, in the link's frame: mass, mass times the centre's
-    place, linear momentum and angular momentum about the link's origin."""
+    """Momentum of a link and all that hangs on it, in the link's frame: mass, mass times the centre's place, linear
+    momentum and angular momentum about the link's origin.
+    """
 
     mass: float
     moment: Expression

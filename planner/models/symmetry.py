@@ -116,8 +116,9 @@ def symmetrised(robot: RobotDescription, pairs: Sequence[Pair]) -> RobotDescript
 
 
 def symmetrised_angles(pairs: Sequence[Pair], angles: Array) -> Array:
-    """Joint angles (n_joints,) made the same left and right where they differ by little; others
-    are kept, so that a pose that is meant to be askew stays so."""
+    """Return the joint angles (n_joints,) made the same left and right where they differ by little; others are kept, so
+    that a pose that is meant to be askew stays so.
+    """
     found = angles.copy()
     for pair in pairs:
         for i, j, sign in pair.joints:
@@ -156,8 +157,9 @@ def _pair(
 
 
 def _sign(one: Joint, twin: Joint) -> float:
-    """Whether the second joint's coordinate is the first's (1) or minus it (-1) in a mirrored
-    motion; 0 if its axis is no mirror image."""
+    """Return the sign of the second joint's coordinate in a mirrored motion: the first's (1) or minus it (-1); 0 if its
+    axis is no mirror image.
+    """
     image = _mirrored_axis(one)
     for sign in (1.0, -1.0):
         if _near(sign * image, twin.axis, DIRECTION):
@@ -184,7 +186,7 @@ def _near(one: Any, other: Any, tolerance: float) -> bool:
 
 
 def _alike_inertia(one: Link, other: Link) -> bool:
-    """Whether the second link is the first's mirror image."""
+    """Check whether the second link is the first's mirror image."""
     size = max(abs(x) for x in one.inertia)
     return (
         abs(one.mass - other.mass) <= SHARE * max(one.mass, 1e-3)
@@ -219,7 +221,7 @@ def _contact_pairs(
 
 
 def _transmissions_alike(robot: RobotDescription, pairs: Sequence[Pair]) -> bool:
-    """Whether motors do the same for both limbs of every pair, and nothing across limbs."""
+    """Check whether motors do the same for both limbs of every pair, and nothing across limbs."""
     geared = robot.joint_to_motor.T @ robot.joint_to_motor
     matrices = (geared, robot.rotor_matrix)
     own = np.zeros_like(geared, dtype=bool)
@@ -240,7 +242,7 @@ def _transmissions_alike(robot: RobotDescription, pairs: Sequence[Pair]) -> bool
 
 
 def _averaged_links(one: Link, other: Link) -> tuple[Link, Link]:
-    """Both links as exact mirror images."""
+    """Return both links as exact mirror images."""
     mass = 0.5 * (one.mass + other.mass)
     com = 0.5 * (np.array(one.com) + np.array(other.com) * PLACE)
     inertia = 0.5 * (np.array(one.inertia) + np.array(other.inertia) * TENSOR)
@@ -252,7 +254,7 @@ def _averaged_links(one: Link, other: Link) -> tuple[Link, Link]:
 
 
 def _averaged_joints(one: Joint, other: Joint, sign: float) -> tuple[Joint, Joint]:
-    """Both joints as exact mirror images; axes almost along y are exactly along it."""
+    """Return both joints as exact mirror images; axes almost along y are exactly along it."""
     flip = PLACE if one.kind == "slide" else -PLACE
     axis = 0.5 * (np.array(one.axis) + sign * np.array(other.axis) * flip)
     axis[np.abs(axis) < DIRECTION] = 0.0
@@ -279,5 +281,5 @@ def _averaged_contacts(one: ContactPoint, other: ContactPoint) -> tuple[ContactP
 
 
 def _numbers(values: Array) -> tuple[float, ...]:
-    """Plain numbers, with no negative zero."""
+    """Return plain numbers, with no negative zero."""
     return tuple(float(x) + 0.0 for x in values)

@@ -1,4 +1,5 @@
-"""From a motion near a plan to the nearest one that fulfils the planner's equations: Newton's steps on the constraints alone.
+"""Correction of a motion near a plan to the nearest one that fulfils the planner's equations: Newton's steps on the
+constraints alone.
 
 An interpolated motion is nearly as good as the plans it comes from, but it obeys no law of motion exactly. So nothing
 is optimised again: each step is the smallest weighted change of the variables that fulfils the linearised
@@ -21,11 +22,11 @@ from ..problem.problem import FullProblem
 from ..solving.solver import VIOLATION
 
 STEPS = 8
-"""At most."""
+"""Greatest number of steps."""
 ENOUGH = 0.1 * VIOLATION
 """A violation that ends the steps."""
 FAST = 1e-2
-"""Where a step has left less than this share of a violation, the next one takes the same factors."""
+"""Share of a violation; where a step has left less, the next one takes the same factors."""
 LOST = 1e3
 """A violation from which the steps do not come back."""
 TOUCHED = 1e-9
@@ -47,7 +48,7 @@ class Correction(NamedTuple):
 
     @property
     def solved(self) -> bool:
-        """Whether all constraints hold."""
+        """True if all constraints hold."""
         return self.violation <= 2.0 * VIOLATION
 
 
@@ -118,7 +119,7 @@ class Corrector:
 
 
 def squares_of_changes(problem: FullProblem) -> Array:
-    """By variable the square of a change that counts as one, (n_variables,)."""
+    """Return by variable the square of a change that counts as one, (n_variables,)."""
     assembly, n = problem.assembly, problem.coordinates.size
     changes = np.full(assembly.variables, INTERVAL)
     for k, knot in enumerate(assembly.knots):
@@ -127,7 +128,7 @@ def squares_of_changes(problem: FullProblem) -> Array:
         changes[state + n : state + 2 * n] = RATE
         if knot.controls:
             changes[control : control + n] = ACCELERATION
-            flies = problem.stretch_at(k).flies
+            flies = problem.phase_at(k).flies
             own = len(problem.coordinates.turning) if flies else problem.coordinates.forces
             changes[control + n : control + n + own] = RATE if flies else FORCE
     return np.asarray(changes * changes)

@@ -21,12 +21,12 @@ LEVEL_FILE, STEPS_FILE = "level.npz", "steps.npz"
 
 
 def shipped_path(robot: str, *, steps: bool = False) -> Path:
-    """Where the plans of hops of a robot ship: those on level ground, or those up and down."""
+    """Return the file of a robot's shipped hop plans: those on level ground, or those up and down."""
     return SHIPPED / "hops" / robot / (STEPS_FILE if steps else LEVEL_FILE)
 
 
 def own_path(robot: RobotDescription, *, steps: bool = False) -> Path:
-    """Where a user's own are kept: with those of tasks, under the robot's name and content."""
+    """Return the file of a user's own: with those of tasks, under the robot's name and content."""
     content = content_name({"format": FILE_FORMAT, "robot": planned_robot(robot)})
     name = f"{readable_name(robot.name)}-{content}"
     return user_folder() / "hops" / name / (STEPS_FILE if steps else LEVEL_FILE)
@@ -44,7 +44,7 @@ def samples_file(robot: RobotDescription, *, steps: bool = False) -> Path | None
 
 
 def missing_plans(robot: RobotDescription) -> Iterator[UnmetRequirement]:
-    """What a block that needs the plans of hops of a robot does not have."""
+    """Yield what a block that needs the plans of hops of a robot lacks."""
     if samples_file(robot) is not None:
         return
     there = sorted(file.parent.name for file in (SHIPPED / "hops").glob(f"*/{LEVEL_FILE}"))
@@ -75,14 +75,14 @@ def samples_of_steps(robot: RobotDescription) -> PlanSamples | None:
 
 
 def level_reach(robot: RobotDescription) -> HopReach:
-    """How far a robot hops on level ground."""
+    """Return the reach of a robot's hops on level ground."""
     reach = samples_of_hops(robot).reach
     assert isinstance(reach, HopReach)
     return reach
 
 
 def step_reach(robot: RobotDescription) -> StepReach:
-    """How far a robot hops up and down, which must have such plans."""
+    """Return the reach of a robot's hops up and down, which must have such plans."""
     reach = samples_of_hops(robot, steps=True).reach
     assert isinstance(reach, StepReach)
     return reach

@@ -11,11 +11,11 @@ from ..task.sequence import edge_of
 from ..task.task import JumpTask
 
 MOST_KINDS = 64
-"""That are kept; BRUCE's hops are of about forty."""
+"""Greatest number of kinds that are kept; BRUCE's hops are of about forty."""
 
 
 class HopProblems:
-    """Makes problems of one robot's hops."""
+    """Maker of the problems of one robot's hops."""
 
     def __init__(self, robot: RobotDescription) -> None:
         self.robot = robot
@@ -32,7 +32,7 @@ class HopProblems:
 
 
 def kind_of(task: JumpTask) -> object:
-    """Equal for tasks whose problems differ only in where the jump leads."""
+    """Return a key that is equal for tasks whose problems differ only in where the jump leads."""
     ahead, up = task.distance_x, task.landing_height
     shared = task.model_copy(
         update={

@@ -1,4 +1,4 @@
-"""What the next jump should do, and the task of the planner that says so."""
+"""Request for the next jump, and the planner's task for it."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ from ..task.task import JumpTask, Knots, make_task
 
 KNOTS = Knots(squat=8, thrust=10, flight=12, landing=10)
 STEP_KNOTS = Knots(squat=9, thrust=10, flight=12, landing=10)
-"""Those of jumps up or down. With fewer the toes dip by more than 1 mm between two knots of a deep squat."""
+"""Knots of jumps up or down. With fewer the toes dip by more than 1 mm between two knots of a deep squat."""
 RISE_SHARE = 0.5
-"""How much higher a jump goes for each metre that it lands higher: with a half, flights take equally long."""
+"""Added height of a jump for each metre that it lands higher: with a half, flights take equally long."""
 TOE_KNOTS = 4
 """Intervals of the part of the thrust on the toes, which is 40 ms long."""
 LEVEL = 0.005
-"""A difference of height [m] that landing takes without being told of it."""
+"""Difference of height [m] that landing tolerates without planning for it."""
 
 
 class HopRequest(NamedTuple):
-    """Where the middle of the feet should land, relative to where it is: ``ahead`` and ``aside``, to the
-    left, [m] in the axes of the feet, ``turn`` to the left [rad], and the ground there is ``up`` higher [m]."""
+    """Wanted landing of the middle of the feet, relative to where it is: ``ahead`` and ``aside``, to the left, [m] in
+    the axes of the feet, ``turn`` to the left [rad], and the ground there is ``up`` higher [m].
+    """
 
     ahead: float
     aside: float
@@ -31,7 +32,7 @@ class HopRequest(NamedTuple):
 
     @property
     def level(self) -> bool:
-        """Whether it is planned as a jump on level ground."""
+        """True if it is planned as a jump on level ground."""
         return abs(self.up) < LEVEL
 
 
@@ -55,7 +56,7 @@ class HopReach(NamedTuple):
         return HopRequest(wanted.ahead / shorter, wanted.aside / shorter, turn, up)
 
     def share(self, wanted: HopRequest) -> float:
-        """By how much all limits must be multiplied for the request to be at their edge."""
+        """Return the factor on all limits for which the request is at their edge."""
         return max(self._share(wanted), abs(wanted.turn) / self.turn)
 
     def _share(self, wanted: HopRequest) -> float:
@@ -63,7 +64,7 @@ class HopReach(NamedTuple):
         return math.hypot(wanted.ahead / along, wanted.aside / self.aside)
 
     def shortened(self, share: float) -> HopReach:
-        """That share of all limits; the jumps are as high."""
+        """Return a reach with that share of all limits; the jumps are as high."""
         ahead, back, aside, turn = (_rounded(share * limit) for limit in self[:4])
         return HopReach(ahead, back, aside, turn, self.rise)
 
@@ -119,9 +120,13 @@ def task_of(wanted: HopRequest, robot: str, rise: float) -> JumpTask:
 def coarse(task: JumpTask) -> JumpTask:
     """Return a task whose parameters are all chosen, on the few intervals of plans that are made in the loop."""
 
-    def on_fewer(span: PhaseSpec) -> PhaseSpec:
-        return span if span.knots is None else span.model_copy(update={"knots": TOE_KNOTS})
+    def on_fewer(phase_spec: PhaseSpec) -> PhaseSpec:
+        return (
+            phase_spec
+            if phase_spec.knots is None
+            else phase_spec.model_copy(update={"knots": TOE_KNOTS})
+        )
 
-    phases = task.phases and tuple(on_fewer(span) for span in task.phases)
+    phases = task.phases and tuple(on_fewer(phase_spec) for phase_spec in task.phases)
     knots = STEP_KNOTS if task.landing_height else KNOTS
     return task.model_copy(update={"knots": knots, "phases": phases})

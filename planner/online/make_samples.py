@@ -38,10 +38,10 @@ ENOUGH = 0.9
 COUNT = 96
 """Requests on level ground that are tried."""
 MARGIN = 1.08
-"""How much further than the reach they go, so that requests at its edge lie between them."""
+"""Factor by which they go beyond the reach, so that requests at its edge lie between them."""
 BASES = (2, 3, 5, 7)
 RISES = (1.0, 0.8, 0.8)
-"""How high jumps are, each as a share of the one before, which has no plan on the spot."""
+"""Heights of jumps, each as a share of the one before, which has no plan on the spot."""
 STILL = HopRequest(0.0, 0.0, 0.0)
 
 
@@ -79,31 +79,33 @@ def step_request(index: int, reach: StepReach) -> HopRequest:
 
 
 def scaled(limits: Sequence[float], robot: RobotDescription) -> list[float]:
-    """Lengths of BRUCE for another robot."""
+    """Scale lengths of BRUCE to another robot."""
     share = standing_height(robot) / HEIGHT
     return [round(share * length, 3) for length in limits]
 
 
 def reach_for(robot: RobotDescription) -> HopReach:
-    """What is asked of a robot on level ground. Back as far as ahead where its feet are balls: it has no heels to land on."""
+    """Return the wanted reach of a robot on level ground. Back as far as ahead where its feet are balls: it has no
+    heels to land on.
+    """
     ahead, back, aside, rise = scaled((*REACH[:3], REACH.rise), robot)
     return HopReach(ahead, ahead if ball_feet(robot) else back, aside, REACH.turn, rise)
 
 
 def step_reach_for(robot: RobotDescription, rise: float) -> StepReach:
-    """What is asked of it up and down."""
+    """Return the wanted reach of a robot up and down."""
     least, ahead, aside, up, down = scaled((*STEP_REACH[:3], *STEP_REACH[4:6]), robot)
     return StepReach(least, ahead, aside, STEP_REACH.turn, up, down, rise)
 
 
 Tell = Callable[[HopRequest, bool], None]
-"""Told of each request, and whether it has a valid plan."""
+"""Callback for each request, with True if it has a valid plan."""
 
 
 def plan_level_hops(
     robot: RobotDescription, wanted: HopReach, tell: Tell, count: int
 ) -> PlanSamples:
-    """Plan those on level ground, lower than asked for where the motors are too weak.
+    """Plan hops on level ground, lower than wanted where the motors are too weak.
 
     Raises:
         PlanError: not even the lowest jump on the spot has a valid plan.

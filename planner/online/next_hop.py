@@ -1,4 +1,4 @@
-"""Makes the plan of the next hop within a fixed number of steps, or says what is done instead."""
+"""Plan of the next hop, made within a fixed number of steps, or its replacement."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from ...blocks.signals import PlanOutcome
 from ...robots.description import RobotDescription
 from ..checking.validity import checked
 from ..problem.problem import FullProblem
@@ -15,6 +14,7 @@ from ..task.plan import PlannedJump
 from .correction import Corrector
 from .hop_problems import HopProblems
 from .hop_request import HopRequest, coarse, task_of
+from .plan_outcome import PlanOutcome
 from .plan_samples import PlanSamples
 
 
@@ -120,7 +120,9 @@ class HopPlanner:
         return plan, steps, time.process_time() - started
 
     def _guesses(self, wanted: HopRequest) -> Iterator[PlannedJump]:
-        """Motions near that of a request: between the stored plans, and where that leads to none the nearest of them."""
+        """Yield motions near that of a request: between the stored plans, and where that leads to none the nearest of
+        them.
+        """
         samples = self.samples(wanted)
         yield samples.interpolated(wanted)
         yield samples.plan(samples.nearest(wanted))

@@ -17,18 +17,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.linear_algebra import product, solve_positive
 from ..task.files import write_whole
+from ..task.phase import Phase
 from ..task.plan import ARRAYS, PlanFileError, PlannedJump
 from .hop_request import HopReach, HopRequest, StepReach, task_of
 
 FILE_FORMAT = "aloft hop plans 3"
 SCALES = np.array([0.1, 0.1, 0.4, 0.05])
-"""What difference of each part of a request counts as a distance of 1."""
+"""Difference of each part of a request that counts as a distance of 1."""
 NEAR = 0.3
-"""Within this distance plans count alike."""
+"""Distance within which plans count alike."""
 KEPT_EXACTLY = ("contact", "phase")
 
 
@@ -76,7 +76,7 @@ class PlanSamples:
         return int(square.argmin())
 
     def plan(self, row: int) -> PlannedJump:
-        """One of the plans. Its flight begins and ends at knots, whose times are in single precision."""
+        """Return one of the plans. Its flight begins and ends at knots, whose times are in single precision."""
         weights = np.eye(len(self.requests))[row]
         plan = self._make(HopRequest(*self.requests[row].tolist()), weights)
         flying = np.flatnonzero(plan.phase == Phase.FLIGHT)
@@ -105,7 +105,7 @@ class PlanSamples:
 
 
 def differences(requests: Array, wanted: HopRequest) -> Array:
-    """What requests (..., 4) differ from the wanted one by, in units of ``SCALES``."""
+    """Return the differences of requests (..., 4) from the wanted one, in units of ``SCALES``."""
     # A difference of height that no plan is made for is no distance between plans on level ground.
     other = np.array(wanted if not wanted.level else (*wanted[:3], 0.0))
     return np.asarray((requests - other) / SCALES)

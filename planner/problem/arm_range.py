@@ -1,4 +1,4 @@
-"""How far arms may swing: ranges of their joints in which they keep clear of the body that carries them.
+"""Swing range of arms: ranges of their joints in which they keep clear of the body that carries them.
 
 An arm here is a limb that moves and has no foot. Its distance from trunk and head has corners, so that a
 solver would follow it badly. It depends on the arm's own few angles alone, so it is looked up beforehand, and what the
@@ -14,22 +14,23 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.kinematics import link_poses
-from ..models.link_shapes import arms, gaps_between, lacking, legs, moving_shapes
+from ..models.link_shapes import arms, clearance_deficit, gaps_between, legs, moving_shapes
 from ..task.scaling import per_robot
 
 POSES = 6000
-"""How many poses of an arm are looked at, at most."""
+"""Greatest number of poses of an arm that are examined."""
 FINEST = 61
 """Angles of a joint of an arm with few joints."""
 TURN = np.pi
-"""rad; how far joints without limits are looked at on either side."""
+"""Range examined on either side of a joint without limits [rad]."""
 
 
 @per_robot
 def arm_ranges(robot: RobotDescription, gap: float) -> Mapping[int, tuple[float, float]]:
-    """By the index of every joint of an arm the angles [rad] around its place in the standing pose in which the arm
-    keeps ``gap`` [m] from the links that stand still with the base, and half of it on its own side of the base's middle
-    plane, or the distances that it stands in. A box: every pose in it does. Arms have no more joints than can be looked at in ``POSES`` poses, three angles each; others are not bounded.
+    """Return by the index of every joint of an arm the angles [rad] around its place in the standing pose in which the
+    arm keeps ``gap`` [m] from the links that stand still with the base, and half of it on its own side of the base's
+    middle plane, or the distances that it stands in. A box: every pose in it does. Arms have no more joints than can be
+    looked at in ``POSES`` poses, three angles each; others are not bounded.
     """
     found: dict[int, tuple[float, float]] = {}
     chains = arms(robot)
@@ -46,7 +47,7 @@ def arm_ranges(robot: RobotDescription, gap: float) -> Mapping[int, tuple[float,
 def _ranges(
     robot: RobotDescription, arm: list[str], joints: list[int], trunk: list[str], gap: float
 ) -> dict[int, tuple[float, float]]:
-    """Those of one arm."""
+    """Return the ranges of one arm."""
     count = min(FINEST, int(POSES ** (1.0 / len(joints))))
     angles, start = list[Array](), list[int]()
     for k in joints:
@@ -79,7 +80,7 @@ def _clear(
     robot: RobotDescription, arm: list[str], joints: list[int], trunk: list[str], gap: float,
     angles: list[Array], start: tuple[int, ...],
 ) -> Array:  # fmt: skip
-    """Whether the arm keeps clear, on the grid of its joints' angles."""
+    """Return whether the arm keeps clear, on the grid of its joints' angles."""
     grid = np.stack(np.meshgrid(*angles, indexing="ij"), axis=-1)
     q = np.tile(robot.standing_position, (grid[..., 0].size, 1))
     q[:, joints] = grid.reshape(len(q), -1)
@@ -91,10 +92,10 @@ def _clear(
     for link in arm:
         for each in moving_shapes(robot, poses, link) if side else ():
             inside = (side * each.corners()[:, :, 1]).min(axis=0) - each.shape.radius
-            clear &= lacking(inside[None], 0.5 * gap, here) <= 0.0
+            clear &= clearance_deficit(inside[None], 0.5 * gap, here) <= 0.0
         for other in trunk:
             own, body = (moving_shapes(robot, poses, name) for name in (link, other))
             if own and body:
                 gaps = gaps_between(own, body)
-                clear &= lacking(gaps, gap, here, carried=other == carrier[link]) <= 0.0
+                clear &= clearance_deficit(gaps, gap, here, carried=other == carrier[link]) <= 0.0
     return np.asarray(clear.reshape(grid.shape[:-1]))

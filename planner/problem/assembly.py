@@ -1,4 +1,4 @@
-"""From pieces on knots to one sparse problem in the order fatrop wants.
+"""Assembly of pieces on knots into one sparse problem in fatrop's order.
 
 Variables are ordered knot by knot: state, then controls. Constraint rows are ordered knot by knot:
 the gap to the next state (next state minus what this knot leads to), then the rest. The functions
@@ -81,7 +81,7 @@ class Assembly:
 
     @property
     def interpreted(self) -> bool:
-        """Whether CasADi's virtual machine evaluates the pieces."""
+        """True if CasADi's virtual machine evaluates the pieces."""
         return any(piece.value.class_name() != "External" for piece in self.pieces.values())
 
     @cached_property
@@ -98,7 +98,7 @@ class Assembly:
         return (shape, *(id(piece) for piece in self.pieces.values()))
 
     def rows_of(self, name: str, k: int) -> tuple[int, Indices]:
-        """Where the kept rows of a piece on a knot begin, and which of its rows they are."""
+        """Return the place at which the kept rows of a piece on a knot begin, and which of its rows they are."""
         start = int(self.row_start[k])
         for other, (_, rows) in self.knots[k].pieces.items():
             if other == name:
@@ -112,7 +112,7 @@ class Assembly:
         return np.arange(end - len(self.knots[k].fixed), end)
 
     def _place(self) -> None:
-        """Global indices of every piece's variables and rows; -1 for rows left out."""
+        """Compute the global indices of every piece's variables and rows; -1 for rows left out."""
         self._columns: dict[str, Indices] = {}
         self._rows: dict[str, Indices] = {}
         for name, users in self.users.items():
@@ -151,10 +151,10 @@ class Assembly:
     # The functions of the whole problem
 
     def functions(self, *, upper: bool = True) -> dict[str, Any]:
-        """``f``, ``g`` (symbols and expressions in a dict for nlpsol) and the derivative functions
-        ``nlp_f``, ``nlp_g``, ``nlp_grad_f``, ``nlp_jac_g``, ``nlp_hess_l`` with the signatures
-        nlpsol's own would have; with ``upper`` also ``hess_lag``, the upper triangle of the
-        Hessian alone."""
+        """Return ``f``, ``g`` (symbols and expressions in a dict for nlpsol) and the derivative functions ``nlp_f``,
+        ``nlp_g``, ``nlp_grad_f``, ``nlp_jac_g``, ``nlp_hess_l`` with the signatures nlpsol's own would have; with
+        ``upper`` also ``hess_lag``, the upper triangle of the Hessian alone.
+        """
         import casadi as ca
 
         x, p = ca.MX.sym("x", self.variables), ca.MX.sym("p", self.parameters)
@@ -261,7 +261,7 @@ class Assembly:
         return ca.MX(pattern, _gather(everything, source, (-1, 1)))
 
     def _hessian(self, values: list[Any], upper: bool) -> list[Any]:
-        """The whole symmetric matrix, and its upper triangle if that is asked for."""
+        """Return the whole symmetric matrix, and its upper triangle if ``upper`` is set."""
         import casadi as ca
 
         rows, columns = [], []
@@ -288,8 +288,9 @@ class Assembly:
 
 
 def _layers(place: Indices, source: Indices, size: int, empty: int) -> list[Any]:
-    """Sums of several values an entry as gathers: the first value of every entry, then the entries
-    and values that are still left over, until none is."""
+    """Return sums of several values an entry as gathers: the first value of every entry, then the entries and values
+    that are still left over, until none is.
+    """
     first = np.full(size, empty, dtype=np.int64)
     layers: list[Any] = [first]
     while len(place):
@@ -305,7 +306,7 @@ def _layers(place: Indices, source: Indices, size: int, empty: int) -> list[Any]
 
 
 def _gather(vector: Any, index: Indices, shape: tuple[int, int]) -> Any:
-    """Those entries of a dense vector."""
+    """Return those entries of a dense vector."""
     import casadi as ca
 
     return ca.reshape(vector.nz[index.tolist()], *shape) if len(index) else ca.MX(0, 1)
@@ -338,7 +339,7 @@ def _sparse(rows: Indices, columns: Indices, shape: tuple[int, int]) -> Any:
 
 
 def _positions(pattern: Any, rows: Indices, columns: Indices) -> Indices:
-    """Which non-zero of the pattern each entry is."""
+    """Return the number of each entry among the pattern's non-zeros."""
     height = pattern.size1()
     own_rows, own_columns = (np.array(x, dtype=np.int64) for x in pattern.get_triplet())
     return np.asarray(np.searchsorted(own_columns * height + own_rows, columns * height + rows))
@@ -346,7 +347,7 @@ def _positions(pattern: Any, rows: Indices, columns: Indices) -> Indices:
 
 @dataclass(frozen=True)
 class NonlinearProgram:
-    """What is solved, of every formulation.
+    """Nonlinear program of any formulation, as the solver takes it.
 
     Attributes:
         assembly: the structure and functions.

@@ -1,6 +1,6 @@
 """The phases of a task divided into intervals: what the knots of its problem stand for.
 
-Knots are the beginnings of intervals, and the end. A stretch is a phase with a number of intervals;
+Knots are the beginnings of intervals, and the end. A problem phase is a phase with a number of intervals;
 where its time is free, and in every flight, the mean length of its intervals is a state that the
 knot before it chooses. With impacts one interval of no length, the touchdown's impulse, comes
 between a flight and the ground.
@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
+from ..task.phase import Phase
 from ..task.sequence import PHASES
 from ..task.task import JumpTask, JumpTaskError
 
@@ -31,7 +31,7 @@ FLIGHT_MIDDLE = 4.0
 
 
 def spacing(phase: Phase, count: int, *, last: bool = True) -> Array:
-    """Interval lengths (count,) with a mean of one; ``last`` says that no jump follows."""
+    """Return interval lengths (count,) with a mean of one; with ``last`` no jump follows."""
     place = (np.arange(count) + 0.5) / count
     if phase is Phase.FLIGHT:
         lengths = 1.0 + (FLIGHT_MIDDLE - 1.0) * np.sin(np.pi * place)
@@ -74,12 +74,12 @@ class ProblemPhase:
 
     @property
     def flies(self) -> bool:
-        """Whether the robot is in the air."""
+        """True if the robot is in the air."""
         return self.phase is Phase.FLIGHT
 
     @property
     def timed(self) -> bool:
-        """Whether the mean length of its intervals is a state."""
+        """True if the mean length of its intervals is a state."""
         return self.flies or self.time is None
 
     @property
@@ -106,27 +106,27 @@ class ProblemPhase:
 
 
 def layout(task: JumpTask, robot: RobotDescription) -> tuple[ProblemPhase, ...]:
-    """Return the stretches of a task in the order of time.
+    """Return the phases of a task in the order of time.
 
     Raises:
         JumpTaskError: a phase on the ground names no contact point.
     """
-    spans, found, knot, place = task.spans(), list[ProblemPhase](), 0, 0
-    for number, span in enumerate(spans):
-        phase, on_ground = PHASES[span.phase], span.on_ground(robot)
+    phase_specs, found, knot, place = task.phase_specs(), list[ProblemPhase](), 0, 0
+    for number, phase_spec in enumerate(phase_specs):
+        phase, on_ground = PHASES[phase_spec.phase], phase_spec.on_ground(robot)
         flies = phase is Phase.FLIGHT
         if not flies and not on_ground:
             raise JumpTaskError(
-                f"phase {number + 1}, {span.phase}: no contact point of {robot.name} is on the ground"
+                f"phase {number + 1}, {phase_spec.phase}: no contact point of {robot.name} is on the ground"
             )
         if task.impact and found and found[-1].flies:
             found.append(
                 ProblemPhase(phase, knot, 1, 0.0, np.zeros(1), place, on_ground, impact=True)
             )
             knot += 1
-        last = all(later.phase != "flight" for later in spans[number:])
-        count = span.knots or 1
+        last = all(later.phase != "flight" for later in phase_specs[number:])
+        count = phase_spec.knots or 1
         lengths = spacing(phase, count, last=last)
-        found.append(ProblemPhase(phase, knot, count, span.time, lengths, place, on_ground))
+        found.append(ProblemPhase(phase, knot, count, phase_spec.time, lengths, place, on_ground))
         knot, place = knot + count, place + flies
     return tuple(found)

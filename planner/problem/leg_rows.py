@@ -20,7 +20,7 @@ from .obstacles import touching_sphere
 def air_rows(
     model: SymbolicModel, coordinates: Coordinates, q: Any, w: Mapping[str, Any]
 ) -> list[Any]:
-    """Heights, distances ahead and sides of the points."""
+    """Return the heights, distances ahead and sides of the points."""
     import casadi as ca
 
     whole = coordinates.expand(q)
@@ -71,8 +71,9 @@ def body_points(model: SymbolicModel, coordinates: Coordinates
 
 
 def fore_and_hind(model: SymbolicModel, coordinates: Coordinates) -> list[tuple[int, int]]:
-    """Pairs of ``body_points`` of a leg and of the next one behind it on the same side, indices: a plane across the
-    torso keeps such legs apart if each point of the one is ahead of each point of the other."""
+    """Return pairs of ``body_points`` of a leg and of the next one behind it on the same side, indices: a plane across
+    the torso keeps such legs apart if each point of the one is ahead of each point of the other.
+    """
     points = body_points(model, coordinates)
     of_limb: dict[int, list[int]] = {}
     for i, (point, _, _) in enumerate(points):
@@ -88,5 +89,5 @@ def fore_and_hind(model: SymbolicModel, coordinates: Coordinates) -> list[tuple[
 
 
 def _root(model: SymbolicModel, limb: int) -> tuple[float, float, float]:
-    """Where a limb's first joint is on the base [m]."""
+    """Return the place of a limb's first joint on the base [m]."""
     return model.robot.joints[model.limbs[limb][0]].origin

@@ -28,7 +28,7 @@ from .layout import ProblemPhase
 Vector3 = tuple[float, float, float]
 Point = tuple[str, tuple[str, tuple[float, float, float]], float]
 SHARES = (0.125, 0.25, 0.375, 0.625, 0.75, 0.875)
-"""Where the points between a calf's ends and its middle are."""
+"""Places of the points between a calf's ends and its middle, as shares of its length."""
 LONG = 0.5
 """Edges of a hull at least as long as that, as a share of its longest one, get points between their ends."""
 ROUNDING = 0.01
@@ -36,10 +36,11 @@ ROUNDING = 0.01
 
 
 def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Point]:
-    """Of the base and the computed limbs (kind, (link, place), radius): contact points, of kind
-    ``foot``, then corners of the shapes, and the middles of capsules, of kind ``calf`` for the links that carry a
-    foot and ``body`` for all others. Between those of a calf there are more, of kind ``shin``, or a step's
-    edge could pass between two of them. The feet's own shapes are left to their contact points."""
+    """Return points of the base and the computed limbs (kind, (link, place), radius): contact points, of kind ``foot``,
+    then corners of the shapes, and the middles of capsules, of kind ``calf`` for the links that carry a foot and
+    ``body`` for all others. Between those of a calf there are more, of kind ``shin``, or a step's edge could pass
+    between two of them. The feet's own shapes are left to their contact points.
+    """
     robot = model.robot
     link_of = {foot.name: foot.link for foot in robot.feet}
     carriers = {joint.parent for joint in robot.joints if joint.child in link_of.values()}
@@ -75,8 +76,9 @@ def obstacle_points(model: SymbolicModel, coordinates: Coordinates) -> list[Poin
 
 
 def _upper_half(link: Link, ball: Vector3) -> Iterator[Point]:
-    """Points along the capsules of a leg's last link, which ends in a ball: of its half at the knee, as the other half
-    is nearer to the ground than the gap that is kept."""
+    """Return points along the capsules of a leg's last link, which ends in a ball: of its half at the knee, as the
+    other half is nearer to the ground than the gap that is kept.
+    """
     corners, _ = corners_of(link.shapes)
     half = 0.5 * max((math.dist(corner, ball) for corner in corners), default=0.0)
     for shape in link.shapes:
@@ -100,8 +102,9 @@ def _between(start: Vector3, end: Vector3, share: float) -> Vector3:
 
 
 def touching_sphere(robot: RobotDescription, contact: int) -> tuple[Vector3, float]:
-    """Centre [m, link frame] and radius [m] of what touches the ground at a contact point: the
-    point itself, without a radius, unless its foot is a ball."""
+    """Return the centre [m, link frame] and radius [m] of what touches the ground at a contact point: the point itself,
+    without a radius, unless its foot is a ball.
+    """
     for ball in ball_feet(robot):
         if ball.point == contact:
             x, y, z = (float(value) for value in ball.centre)
@@ -112,10 +115,11 @@ def touching_sphere(robot: RobotDescription, contact: int) -> tuple[Vector3, flo
 def heights_above_step(
     model: SymbolicModel, coordinates: Coordinates, q: Any, w: Mapping[str, Any]
 ) -> list[Any]:
-    """Heights of ``obstacle_points``, less their radii, above ground that changes by ``step`` at
-    ``edge`` on the way ``onwards`` (+1 or -1); within ``early`` of the edge, and a point's radius,
-    the higher ground still, or already, counts for all but 0.25 % of the step. Ground that leans, and
-    its step, are planes, and ``higher`` says which side is the higher one."""
+    """Return the heights of ``obstacle_points``, less their radii, above ground that changes by ``step`` at ``edge`` on
+    the way ``onwards`` (+1 or -1); within ``early`` of the edge, and a point's radius, the higher ground still, or
+    already, counts for all but 0.25 % of the step. Ground that leans, and its step, are planes, and ``higher`` marks
+    the higher side.
+    """
     import casadi as ca
 
     frames = model.frames(coordinates.expand(q), coordinates.limbs)
@@ -135,7 +139,7 @@ def heights_above_step(
 
 
 class ObstacleRows:
-    """Which points a problem keeps above the ground at a knot, and above which ground."""
+    """Points that a problem keeps above the ground at a knot, and the ground below them."""
 
     def __init__(self, model: SymbolicModel, coordinates: Coordinates) -> None:
         kinds = [kind for kind, _, _ in obstacle_points(model, coordinates)]
@@ -151,19 +155,21 @@ class ObstacleRows:
     def _of(self, *kinds: str) -> Indices:
         return np.sort(np.concatenate([self._of_kind[kind] for kind in kinds]))
 
-    def rows(self, hop: Hop, edge: float | None, stretch: ProblemPhase, first: bool) -> Indices:
-        """The rows of a jump's knot; ``first`` says that it is the flight's first."""
+    def rows(
+        self, hop: Hop, edge: float | None, problem_phase: ProblemPhase, first: bool
+    ) -> Indices:
+        """Return the rows of a jump's knot; ``first`` marks the flight's first."""
         turns = bool(hop.rotation)
-        if self.knees_fold and not stretch.flies and not turns:
+        if self.knees_fold and not problem_phase.flies and not turns:
             # A leg that ends in a ball has no ankle, so its knee can fold down to the ground.
             return self._folding
-        landed = not stretch.flies and stretch.place > 0 and edge is not None
+        landed = not problem_phase.flies and problem_phase.place > 0 and edge is not None
         if edge is None and not turns:
             return np.zeros(0, np.int64)
         # Off a step the legs may give way until the hips are near the ground.
         kinds = ["calf"] if turns else ["calf", "shin", "shank"]
         kinds += ["body"] if turns or landed else []
-        if turns and stretch.flies and not first:
+        if turns and problem_phase.flies and not first:
             kinds = ["foot", *kinds]
         return np.concatenate([self._of_kind[kind] for kind in kinds])
 
@@ -171,8 +177,9 @@ class ObstacleRows:
 def side_clearance(
     robot: RobotDescription, hop: Hop, edge: float | None, start: StanceLocation, end: StanceLocation, apart: float
 ) -> float:  # fmt: skip
-    """How far [m] the folding knees of a robot with ball feet keep off a step's side: as far ``apart`` as
-    from the ground, or as the standing robot is. Links of other robots keep ``ROUNDING`` from it."""
+    """Return the distance [m] that the folding knees of a robot with ball feet keep off a step's side: as far ``apart``
+    as from the ground, or as the standing robot is. Links of other robots keep ``ROUNDING`` from it.
+    """
     if edge is None or hop.rotation or not ball_feet(robot):
         return 0.0
     before, behind = edge_room(robot, hop, start, end, apart)

@@ -35,13 +35,13 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models import simple_models as centroidal
 from ..models.euler_angles import pose_of
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
+from ..task.phase import Phase
 from ..task.task import JumpTask
 from .assembly import Knot
 from .program import BoundsBuilder, Grid, SimpleProblem, ballistic_flight, uniform_grid
@@ -100,7 +100,7 @@ def make_piece(model: SymbolicModel, name: str) -> StageFunction:
 
 
 def _interval(model: SymbolicModel, x: Any, v: Any, pull: Any, F: Any, w: Any) -> tuple[Any, Any]:
-    """Knot k + 1: the integration, momentum rates and the friction cone, and its cost."""
+    """Return the rows of knot k + 1, the integration, momentum rates and the friction cone, and its cost."""
     import casadi as ca
 
     n, dt, mass = model.size + 1, w["step"], model.robot.total_mass
@@ -141,7 +141,7 @@ def _interval(model: SymbolicModel, x: Any, v: Any, pull: Any, F: Any, w: Any) -
 
 
 def _posture(model: SymbolicModel, x: Any, w: Any) -> tuple[Any, Any]:
-    """Return the centre of mass and the contact points are those of the position."""
+    """Return the rows by which centre of mass and contact points are those of the position."""
     import casadi as ca
 
     n = model.size + 1
@@ -159,7 +159,7 @@ def _posture(model: SymbolicModel, x: Any, w: Any) -> tuple[Any, Any]:
 
 
 def _attitude(q: Any, w: Any) -> tuple[Any, Any]:
-    """Half the sine of the turn that is missing."""
+    """Return half the sine of the turn that is missing."""
     import casadi as ca
 
     back = ca.vertcat(-w["wanted"][:3], w["wanted"][3])
@@ -205,7 +205,7 @@ class PaperProblemBuilder:
         return self.fill.done(self.task, self.model, self.grid, self.start, self.end)
 
     def _in_contact(self, k: int) -> bool:
-        """Whether the feet are on the ground at a knot; at the last one that follows from rest."""
+        """Check whether the feet are on the ground at a knot; at the last one that follows from rest."""
         return 0 < k <= self.lift_off or self.touchdown <= k < self.last
 
     def _knots(self) -> list[Knot]:
@@ -231,7 +231,7 @@ class PaperProblemBuilder:
         return [*knots, end]
 
     def _fix(self) -> None:
-        """Q: standing still at the start, the velocity at lift-off, at rest in place at the end."""
+        """Fix Q: standing still at the start, the velocity at lift-off, at rest in place at the end."""
         flight = float(self.grid.steps[self.grid.flight].sum())
         across = [self.task.distance_x / flight, self.task.distance_y / flight]
         self.fill.fix(0, "stance", self._at_rest(self.q_start, self.start.com))
@@ -243,8 +243,9 @@ class PaperProblemBuilder:
         return np.concatenate([q, com, np.zeros(6)])
 
     def _bound_state(self, k: int) -> None:
-        """Joint limits; the centre of mass is at most as high as standing in stance, and between
-        that and the apex in flight."""
+        """Bound joints by their limits, and the centre of mass: at most as high as standing in stance, and between that
+        and the apex in flight.
+        """
         if k in (0, self.last):
             return
         at = int(self.fill.assembly.state_start[k])
@@ -262,7 +263,7 @@ class PaperProblemBuilder:
             self.fill.upper[height] = landing
 
     def _nominal(self, k: int) -> Array:
-        """q_nom: standing, and in flight from one stance to the other at constant rates."""
+        """Return q_nom: standing, and in flight from one stance to the other at constant rates."""
         share = min(max((k - self.lift_off) / len(self.grid.flight), 0.0), 1.0)
         return pose_of((1.0 - share) * self.start.coordinates + share * self.end.coordinates)
 
@@ -302,7 +303,7 @@ class PaperProblemBuilder:
         self.fill.rows("attitude", k, [("stance", 3, 0.0, 0.0)])
 
     def _guess(self, k: int) -> None:
-        """Standing, a ballistic flight, standing; the weight shared by all contact points."""
+        """Return the guess: standing, a ballistic flight, standing; the weight shared by all contact points."""
         first, last = self.start, self.end
         flight = float(self.grid.steps[self.grid.flight].sum())
         q, com, speed = self._nominal(k), first.com.copy(), np.zeros(3)

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.kinematics import fall_height
@@ -23,6 +22,7 @@ from ..models.coordinates import Coordinates
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.margins import Margins, joint_bounds
+from ..task.phase import Phase
 from ..task.sequence import StanceLocation, ground_axes
 from ..task.task import JumpTask
 from .arm_range import arm_ranges
@@ -42,7 +42,7 @@ Rows = tuple[str, int, float, float]
 
 
 def rows_of_each(family: str, low: Array, high: Array) -> list[Rows]:
-    """One row for each pair of bounds."""
+    """Return one row for each pair of bounds."""
     return [(family, 1, float(a), float(b)) for a, b in zip(low, high, strict=True)]
 
 
@@ -52,7 +52,7 @@ class FullProblem(NonlinearProgram):
 
     Attributes:
         stances: where the robot stands at the start, between jumps and at the end.
-        stretches: the phases with their intervals.
+        problem_phases: the phases with their intervals.
         steps: the interval lengths [s]; by their mean where that is a variable.
         exact: the model of the robot as it is; ``model`` is the same left and right in mirrored
             coordinates.
@@ -62,47 +62,51 @@ class FullProblem(NonlinearProgram):
     model: SymbolicModel
     coordinates: Coordinates
     stances: tuple[Stance, ...]
-    stretches: tuple[ProblemPhase, ...]
+    problem_phases: tuple[ProblemPhase, ...]
     steps: Array
     exact: SymbolicModel
 
     @property
     def start(self) -> Stance:
-        """Where the robot stands at the start."""
+        """Stance of the robot at the start."""
         return self.stances[0]
 
     @property
     def end(self) -> Stance:
-        """Where the robot stands at the end."""
+        """Stance of the robot at the end."""
         return self.stances[-1]
 
     @property
     def phases(self) -> list[Phase]:
         """The phase of every interval."""
-        return [stretch.phase for stretch in self.stretches for _ in range(stretch.count)]
+        return [
+            problem_phase.phase
+            for problem_phase in self.problem_phases
+            for _ in range(problem_phase.count)
+        ]
 
     @property
     def flights(self) -> tuple[range, ...]:
         """The knots of every flight, lift-off to the one before touchdown."""
-        return tuple(range(s.first, s.stop) for s in self.stretches if s.flies)
+        return tuple(range(s.first, s.stop) for s in self.problem_phases if s.flies)
 
     @property
     def flight(self) -> range:
         """The knots of the first flight."""
         return self.flights[0]
 
-    def stretch_at(self, k: int) -> ProblemPhase:
-        """Return the stretch of the interval that begins with a knot; the last one at the end."""
-        return next((s for s in self.stretches if k < s.stop), self.stretches[-1])
+    def phase_at(self, k: int) -> ProblemPhase:
+        """Return the phase of the interval that begins with a knot; the last one at the end."""
+        return next((s for s in self.problem_phases if k < s.stop), self.problem_phases[-1])
 
     def posture(self, k: int) -> Array:
         """Return the posture, of all coordinates, that the cost prefers: standing, turning in flight."""
-        stretch = self.stretch_at(k)
-        here = self.stances[stretch.place].coordinates
-        if not stretch.flies:
+        problem_phase = self.phase_at(k)
+        here = self.stances[problem_phase.place].coordinates
+        if not problem_phase.flies:
             return here
-        share = (k - stretch.first) / stretch.count
-        return (1.0 - share) * here + share * self.stances[stretch.place + 1].coordinates
+        share = (k - problem_phase.first) / problem_phase.count
+        return (1.0 - share) * here + share * self.stances[problem_phase.place + 1].coordinates
 
 
 class ProblemBuilder:
@@ -120,14 +124,17 @@ class ProblemBuilder:
         self.task, self.model, self.coordinates = task, model, coordinates
         self.exact = exact or model
         self.structure = Structure(task, model, coordinates, pieces, stances)
-        self.stretches, self.of_knot = self.structure.stretches, self.structure.of_knot
+        self.problem_phases, self.of_knot = self.structure.problem_phases, self.structure.of_knot
         self.stances, self.hops = self.structure.stances, self.structure.hops
         self.margins, self.leans = task.margins or Margins(), task.leans
         self.sizes = parameter_sizes(coordinates, self.leans)
         self.n, self.m = coordinates.size, len(coordinates.joints)
         self.forces = coordinates.forces
         self.steps = np.concatenate(
-            [s.lengths * (1.0 if s.timed else (s.time or 0.0) / s.count) for s in self.stretches]
+            [
+                s.lengths * (1.0 if s.timed else (s.time or 0.0) / s.count)
+                for s in self.problem_phases
+            ]
         )
         self.pieces, self.free_base = pieces, coordinates.free_base
         self._nominal: dict[int, Array] = {}
@@ -149,7 +156,7 @@ class ProblemBuilder:
         self.problem = FullProblem(
             self.assembly, self.lower, self.upper, self.row_lower, self.row_upper,
             self.parameters, self.families, self.task, self.model, self.coordinates,
-            self.stances, self.stretches, self.steps, self.exact,
+            self.stances, self.problem_phases, self.steps, self.exact,
         )  # fmt: skip
         for k in range(len(self.of_knot) + 1):
             self._bound_state(k)
@@ -175,12 +182,12 @@ class ProblemBuilder:
             row_lower=other.row_lower, row_upper=other.row_upper, parameters=other.parameters,
             families=other.families,
         )  # fmt: skip
-        for k, stretch in enumerate(self.of_knot):
-            begins = stretch.place == 0 and not stretch.flies
+        for k, problem_phase in enumerate(self.of_knot):
+            begins = problem_phase.place == 0 and not problem_phase.flies
             if not begins:
                 other._bound_base(k)
-                if not stretch.impact:
-                    other._set(stretch.piece, k, nominal=other.nominal(k))
+                if not problem_phase.impact:
+                    other._set(problem_phase.piece, k, nominal=other.nominal(k))
             for name in self.assembly.knots[k].pieces:
                 if name in LEADING and not (begins and name == "contact"):
                     other._fill(name, k)
@@ -191,12 +198,12 @@ class ProblemBuilder:
         return other.problem
 
     def _fill(self, name: str, k: int) -> None:
-        """Bounds and parameters of a piece on a knot."""
+        """Set the bounds and parameters of a piece on a knot."""
         fill = self._fill_stance if name == "free_stance" else getattr(self, f"_fill_{name}")
         fill(k)
 
     def _give(self, k: int) -> None:
-        """Bounds of the rows of a knot's variables that are given."""
+        """Set the bounds of the rows of a knot's variables that are given."""
         for row, (_, value, family) in zip(
             self.assembly.fixed_rows(k), self.structure.given.get(k, []), strict=True
         ):
@@ -211,52 +218,55 @@ class ProblemBuilder:
         base = len(self.free_base)
         if k == len(self.of_knot):
             return
-        stretch, knot = self.of_knot[k], self.assembly.knots[k]
+        problem_phase, knot = self.of_knot[k], self.assembly.knots[k]
         if k:
-            limits = joint_bounds(self.model.robot, self.margins, stretch.place > 0)
+            limits = joint_bounds(self.model.robot, self.margins, problem_phase.place > 0)
             for joint, (low, high) in self._arm_ranges.items():
                 limits[joint] = max(limits[joint, 0], low), min(limits[joint, 1], high)
             limits = limits[list(self.coordinates.moving)]
             self.lower[start + base : start + n] = limits[:, 0]
             self.upper[start + base : start + n] = limits[:, 1]
             self._bound_base(k)
-        if k == 0 and stretch.timed:
-            self.lower[start + 2 * n], self.upper[start + 2 * n] = stretch.bounds
+        if k == 0 and problem_phase.timed:
+            self.lower[start + 2 * n], self.upper[start + 2 * n] = problem_phase.bounds
         control = int(self.assembly.control_start[k])
-        if not stretch.flies:
-            every, idle = len(self.coordinates.axes), self.structure.idle(stretch)
+        if not problem_phase.flies:
+            every, idle = len(self.coordinates.axes), self.structure.idle(problem_phase)
             for point in range(len(self.coordinates.contacts)):
                 if point not in idle:
-                    self.lower[control + n + point * every + every - 1] = self._least_load(stretch)
+                    self.lower[control + n + point * every + every - 1] = self._least_load(
+                        problem_phase
+                    )
         following = self.of_knot[k + 1] if knot.hold is not None else None
         if following is not None and following.time is None and knot.hold is not None:
             self.lower[control + knot.hold], self.upper[control + knot.hold] = following.bounds
 
     def _bound_base(self, k: int) -> None:
-        """How far the torso may lean at a knot behind the first; and how low it may be on legs that fold until it
-        lies on the ground, or the robot would count as fallen."""
-        stretch = self.of_knot[k]
-        if self.structure.obstacles.knees_fold and not stretch.flies:
+        """Bound the torso's lean at a knot behind the first, and its height on legs that fold until it lies on the
+        ground, or the robot would count as fallen.
+        """
+        problem_phase = self.of_knot[k]
+        if self.structure.obstacles.knees_fold and not problem_phase.flies:
             at = int(self.assembly.state_start[k]) + self.free_base.index(2)
-            ground = self.structure.places[stretch.place].z
+            ground = self.structure.places[problem_phase.place].z
             self.lower[at] = ground + self._fall_height + (self.margins.step or 0.0)
         pitch, lean = self.free_base.index(3), self._most_lean(k)
         nominal, at = float(self.nominal(k)[pitch]), int(self.assembly.state_start[k]) + pitch
         self.lower[at], self.upper[at] = nominal - lean, nominal + lean
 
-    def _least_load(self, stretch: ProblemPhase) -> float:
+    def _least_load(self, problem_phase: ProblemPhase) -> float:
         """Return the least upward force of every contact point on the ground [N]."""
-        if not self.margins.load or stretch.impact or stretch.phase == Phase.LANDING:
+        if not self.margins.load or problem_phase.impact or problem_phase.phase == Phase.LANDING:
             return 0.0
         robot = self.model.robot
-        return self.margins.load * robot.total_mass * GRAVITY / max(1, len(stretch.contacts))
+        return self.margins.load * robot.total_mass * GRAVITY / max(1, len(problem_phase.contacts))
 
     def _most_lean(self, k: int) -> float:
-        """How far the torso may lean away from the nominal posture at a knot."""
-        stretch, bounds = self.of_knot[k], [np.inf]
-        if stretch.place == 0 and not (stretch.flies and k > stretch.first):
+        """Return the largest lean of the torso away from the nominal posture at a knot."""
+        problem_phase, bounds = self.of_knot[k], [np.inf]
+        if problem_phase.place == 0 and not (problem_phase.flies and k > problem_phase.first):
             bounds.append(self.margins.squat_lean or np.inf)
-        if stretch.place > 0 and not stretch.flies:
+        if problem_phase.place > 0 and not problem_phase.flies:
             bounds.append(self.margins.landing_lean or np.inf)
             if self.of_knot[k - 1].flies and self.task.touchdown_lean is not None:
                 bounds.append(self.task.touchdown_lean)
@@ -265,7 +275,7 @@ class ProblemBuilder:
     # What a piece's rows ask for, and its parameters
 
     def _rows(self, name: str, k: int, families: list[Rows]) -> None:
-        """Bounds and families of a piece's rows, given for all rows after the gap in turn."""
+        """Set the bounds and families of a piece's rows, given for all rows after the gap in turn."""
         start, kept = self.assembly.rows_of(name, k)
         key = name, tuple(families)
         if key not in self._tables:  # many knots have the same
@@ -326,7 +336,7 @@ class ProblemBuilder:
         return np.asarray(self.model.robot.motors.no_load_speed[chosen] * self._effort(k))
 
     def _slope(self) -> Array:
-        """How steeply the computed motors' torque falls with speed [N m s/rad]."""
+        """Return the slope at which the computed motors' torque falls with speed [N m s/rad]."""
         motors, chosen = self.model.robot.motors, list(self.coordinates.joints)
         slope = motors.peak_torque / (motors.no_load_speed - motors.corner_speed)
         return np.asarray(slope[chosen])
@@ -351,21 +361,21 @@ class ProblemBuilder:
         return self._nominal[k]
 
     def _fill_stance(self, k: int) -> None:
-        weights, share, stretch = self.task.weights, self.coordinates.share, self.of_knot[k]
+        weights, share, problem_phase = self.task.weights, self.coordinates.share, self.of_knot[k]
         self._set(
-            stretch.piece, k, step=self.steps[k], share=self.steps[k],
+            problem_phase.piece, k, step=self.steps[k], share=self.steps[k],
             force=weights.force * share, friction=self.task.friction / np.sqrt(2.0),
-            pressure=self.margins.pressure, **self._interval(k), **self._axes(stretch),
+            pressure=self.margins.pressure, **self._interval(k), **self._axes(problem_phase),
         )  # fmt: skip
         base = ("dynamics", len(self.coordinates.rows), 0.0, 0.0)
         pressure = ("pressure", len(self.coordinates.contacts), 0.0, np.inf)
-        self._rows(stretch.piece, k, [base, *self._motor_rows(k), self._cones(), pressure])
+        self._rows(problem_phase.piece, k, [base, *self._motor_rows(k), self._cones(), pressure])
 
-    def _axes(self, stretch: ProblemPhase, heading: float = 0.0) -> dict[str, Array]:
+    def _axes(self, problem_phase: ProblemPhase, heading: float = 0.0) -> dict[str, Array]:
         """Return the parameter of a piece on ground that leans: the axes of forces, and of feet where these have that
         heading.
         """
-        axes = ground_axes(self.stances[stretch.place].slope, heading)
+        axes = ground_axes(self.stances[problem_phase.place].slope, heading)
         return {"axes": axes.ravel(order="F")} if self.leans else {}
 
     def _cones(self) -> Rows:
@@ -388,16 +398,16 @@ class ProblemBuilder:
         self._rows("flight", k, [("dynamics", balance, 0.0, 0.0), *self._motor_rows(k)])
 
     def _fill_contact(self, k: int) -> None:
-        stretch = self.of_knot[k]
-        stance = self.stances[stretch.place]
+        problem_phase = self.of_knot[k]
+        stance = self.stances[problem_phase.place]
         places = stance.footholds[list(self.coordinates.contacts)].ravel()
         heading = [np.cos(stance.heading), np.sin(stance.heading)]
         self._set(
-            "contact", k, place=places, heading=heading, **self._axes(stretch, stance.heading)
+            "contact", k, place=places, heading=heading, **self._axes(problem_phase, stance.heading)
         )
         feet = self.pieces["contact"].rows // 2
         speeds = [("foot velocity", feet, 0.0, 0.0)]
-        if stretch.impact:  # hits the ground from above
+        if problem_phase.impact:  # hits the ground from above
             *along, down = [most or np.inf for most in self.structure.touchdown_speeds()]
             of_point = [("foot velocity", 1, -most, most) for most in along]
             of_point.append(("foot velocity", 1, -down, np.inf))
@@ -406,11 +416,15 @@ class ProblemBuilder:
 
     def _fill_obstacle(self, k: int) -> None:
         hop, place, edge = self.structure.hop_at(k)
-        stretch, obstacles = self.structure.phase_at(k), self.structure.obstacles
-        share = self.structure.flight_share(k) if stretch.flies else float(stretch.place > 0)
-        end = self.structure.places[min(stretch.place + 1, len(self.hops))]
+        problem_phase, obstacles = self.structure.phase_at(k), self.structure.obstacles
+        share = (
+            self.structure.flight_share(k)
+            if problem_phase.flies
+            else float(problem_phase.place > 0)
+        )
+        end = self.structure.places[min(problem_phase.place + 1, len(self.hops))]
         apart = BODY_CLEARANCE if self.margins.step is None else self.margins.step
-        number = min(stretch.place, len(self.hops) - 1)
+        number = min(problem_phase.place, len(self.hops) - 1)
         if number not in self._beside:
             robot = self.exact.robot
             self._beside[number] = side_clearance(robot, hop, edge, place, end, apart)
@@ -423,13 +437,13 @@ class ProblemBuilder:
         ])  # fmt: skip
 
     def _fill_take_off(self, k: int) -> None:
-        hop, stretch = self.structure.hop_at(k)[0], self.of_knot[k]
-        rise = self.stances[stretch.place].com[2] + (hop.rise or 0.0)
+        hop, problem_phase = self.structure.hop_at(k)[0], self.of_knot[k]
+        rise = self.stances[problem_phase.place].com[2] + (hop.rise or 0.0)
         speeds = (self.margins.lift_off_speed or 0.0, np.inf)
         if hop.take_off_speed is not None:
             speeds = (hop.take_off_speed, hop.take_off_speed)
         lift_off, touchdown = self.task.lift_off_momentum, self.task.touchdown_momentum
-        given = lift_off if stretch.flies else touchdown
+        given = lift_off if problem_phase.flies else touchdown
         most = np.inf if given is None else given
         self._rows("take_off", k, [
             ("apex", 1, rise, rise), ("take-off speed", 1, *speeds),
@@ -437,9 +451,10 @@ class ProblemBuilder:
         ])  # fmt: skip
 
     def _fill_air(self, k: int) -> None:
-        """Feet and calves are above the ground. At a step they are above the higher ground while
-        it is under them, and at one knot, about ``STEP_DOWN_SHARE`` or ``STEP_UP_SHARE`` of the
-        flight's time, also on the lower side of the edge."""
+        """Keep feet and calves above the ground. At a step they are above the higher ground while it is under them, and
+        at one knot, about ``STEP_DOWN_SHARE`` or ``STEP_UP_SHARE`` of the flight's time, also on the lower side of the
+        edge.
+        """
         task, points = self.task, self._body_points
         n_feet, place = len(self.coordinates.contacts), self.of_knot[k].place
         here = self.structure.places[place]
@@ -476,7 +491,7 @@ class ProblemBuilder:
 
     @cached_property
     def _leg_gaps(self) -> list[float]:
-        """The least gaps [m] between fore and hind legs: those of the standing robot where it has less than asked for."""
+        """Least gaps [m] between fore and hind legs: the task's, or those of the standing robot where it has less."""
         count = self.structure.leg_pairs
         if not count:
             return []

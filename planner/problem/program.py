@@ -1,4 +1,4 @@
-"""What the formulations ``paper`` and ``srbm`` hand to the solver: the grid of a jump of one flight, and how they fill it."""
+"""Program of the formulations ``paper`` and ``srbm``: the grid of a jump of one flight, and how they fill it."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models.exact_dynamics import ExactDynamics, half_steps, joint_motions
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.files import PlanError
+from ..task.phase import Phase
 from ..task.task import JumpTask
 from .assembly import Assembly, Knot, NonlinearProgram
 from .stage_functions import StageFunction
@@ -42,7 +42,7 @@ class Grid:
 
 
 def uniform_grid(task: JumpTask, flight_time: float) -> Grid:
-    """Intervals of equal length within every phase, as the paper's fixed dt.
+    """Return intervals of equal length within every phase, as the paper's fixed dt.
 
     Raises:
         PlanError: the task asks for what only ``formulation: full`` can do.
@@ -79,7 +79,7 @@ def check_supported(task: JumpTask) -> None:
 
 
 def ballistic_flight(task: JumpTask, *, backward_steps: int = 0) -> tuple[float, float]:
-    """Vertical take-off speed [m/s] and flight time [s] from standing height to standing height.
+    """Return the vertical take-off speed [m/s] and flight time [s] from standing height to standing height.
 
     ``backward_steps`` is the number of steps of the paper's integration, which falls a little
     faster than the exact parabola: g T^2 (1 + 1/n) / 2.
@@ -168,7 +168,7 @@ class BoundsBuilder:
         self.guess = np.zeros(variables)
 
     def rows(self, name: str, k: int, families: list[tuple[str, int, float, float]]) -> None:
-        """Families, numbers and bounds of a piece's kept rows on a knot, in order."""
+        """Set families, numbers and bounds of a piece's kept rows on a knot, in order."""
         start, kept = self.assembly.rows_of(name, k)
         for family, count, low, high in families:
             self.families[start : start + count] = [family] * count
@@ -178,14 +178,14 @@ class BoundsBuilder:
         assert start == self.assembly.rows_of(name, k)[0] + len(kept)
 
     def set(self, name: str, k: int, **values: Any) -> None:
-        """Parameters of a piece on a knot."""
+        """Set the parameters of a piece on a knot."""
         start = self.assembly.parameter_start[name, k]
         for key, size in self.sizes[name].items():
             self.parameters[start : start + size] = values[key]
             start += size
 
     def fix(self, k: int, family: str, values: Array | list[float]) -> None:
-        """The values of a knot's fixed variables."""
+        """Fix a knot's fixed variables at these values."""
         rows = self.assembly.fixed_rows(k)
         self.row_lower[rows] = self.row_upper[rows] = values
         for row in rows:

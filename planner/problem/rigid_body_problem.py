@@ -25,7 +25,6 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ..models.robot_model import Stance
@@ -36,6 +35,7 @@ from ..models.symbolic_model import (
     base_angular_velocity,
     base_rotation,
 )
+from ..task.phase import Phase
 from ..task.task import JumpTask
 from .assembly import Knot
 from .program import BoundsBuilder, SimpleProblem, ballistic_flight, uniform_grid
@@ -238,7 +238,7 @@ class RigidBodyProblemBuilder:
             self.fill.rows("take_off", k, [("take-off speed", 1, self.up, self.up)])
 
     def _guess(self, k: int) -> None:
-        """Standing, a ballistic flight, standing; the weight shared by all contact points."""
+        """Return the guess: standing, a ballistic flight, standing; the weight shared by all contact points."""
         assembly, share = self.fill.assembly, (k - self.flight.start) / len(self.flight)
         at = int(assembly.state_start[k])
         state = self._at_rest(self._stance_at(k))

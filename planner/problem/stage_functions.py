@@ -223,7 +223,7 @@ DRIFT_RATE = 10.0
 
 PIECES = ("stance", "free_stance", "flight", "impact", "contact", "take_off", "air", "obstacle")
 SLOPED = "sloped_"
-"""Before the names of these pieces where the ground leans."""
+"""Prefix of these pieces' names where the ground leans."""
 SLOPED_PIECES = ("stance", "free_stance", "impact", "contact", "air", "obstacle")
 
 
@@ -278,7 +278,7 @@ COORDINATES: Mapping[str, Callable[[SymbolicModel], Coordinates | None]] = {
     "sagittal": sagittal_coordinates,
     "mirrored": mirrored_coordinates,
 }
-"""By their name."""
+"""Makers of coordinates, by their name."""
 
 
 def make_coordinates(model: SymbolicModel, name: str) -> Coordinates:
@@ -383,7 +383,7 @@ def _interval(
 def _motor_rows(
     model: SymbolicModel, coordinates: Coordinates, torque: Any, begin: Any, end: Any, slope: Any
 ) -> list[Any]:
-    """Motor torque, the torque-speed line at begin and end, and motor speed."""
+    """Return the rows of motor torque, the torque-speed line at begin and end, and motor speed."""
     import casadi as ca
 
     to_motor = model.robot.torque_to_motor[np.ix_(coordinates.joints, coordinates.joints)]
@@ -439,7 +439,7 @@ def _cones(coordinates: Coordinates, forces: Any, friction: Any) -> list[Any]:
 def _pressures(
     model: SymbolicModel, coordinates: Coordinates, forces: Any, share: Any
 ) -> list[Any]:
-    """By how much every point carries more than that share of its foot's load."""
+    """Return the load of every point beyond that share of its foot's load."""
     contacts = model.robot.contacts
     rows = []
     for c in coordinates.contacts:
@@ -450,8 +450,9 @@ def _pressures(
 
 def _impulse_balance(model: SymbolicModel, coordinates: Coordinates, q: Any, change: Any,
                      impulses: Any, w: Mapping[str, Any]) -> Any:  # fmt: skip
-    """M dv - J' L of the base (body frame) and of the joints that are coordinates: the others of a
-    mirrored motion are held."""
+    """Return M dv - J' L of the base (body frame) and of the joints that are coordinates: the others of a mirrored
+    motion are held.
+    """
     import casadi as ca
 
     still = ca.SX.zeros(model.size)
@@ -503,8 +504,9 @@ def derived(
 
 def _place_errors(model: SymbolicModel, coordinates: Coordinates, q: Any, w: Mapping[str, Any]
                   ) -> Any:  # fmt: skip
-    """Of every contact point its error along and across the foot and upwards, or normal to the
-    ground, in the heading that the foot stands with."""
+    """Return every contact point's error along and across the foot and upwards, or normal to the ground, in the heading
+    that the foot stands with.
+    """
     import casadi as ca
 
     place, heading = w["place"], w["heading"]

@@ -1,4 +1,4 @@
-"""Which variables and rows a jump's problem has at each of its knots.
+"""Variables and rows of a jump's problem at each of its knots.
 
 What is given there comes with it: the start, the end, times, and no force on points that are not on
 the ground.
@@ -41,13 +41,13 @@ TOLERANCE = 1e-2
 
 
 def reduced_contacts(coordinates: Coordinates, points: Iterable[int]) -> set[int]:
-    """Those of the coordinates' own contact points that are among the robot's ``points``."""
+    """Return those of the coordinates' own contact points that are among the robot's ``points``."""
     chosen = set(points)
     return {i for i, c in enumerate(coordinates.contacts) if c in chosen}
 
 
 def is_mirrored(coordinates: Coordinates, points: Iterable[int]) -> bool:
-    """Whether a mirrored motion can stand on these of the robot's points."""
+    """Check whether a mirrored motion can stand on these of the robot's points."""
     chosen, matrix = set(points), coordinates.force_matrix
     own = reduced_contacts(coordinates, chosen)
     every = len(coordinates.axes)
@@ -73,17 +73,18 @@ class ContactRows:
         self._errors = self._each * len(self._foot)
 
     def velocities(self, points: set[int]) -> Indices:
-        """Rows of the velocities of points on the ground."""
+        """Return the rows of the velocities of points on the ground."""
         return self._rows(points, set())
 
     def speeds(self, points: set[int], axes: Iterable[int]) -> Indices:
-        """Rows of the velocities of points that hit the ground, in those of their axes: the last
-        one is upwards, those before it along the foot and across it."""
+        """Return the rows of the velocities of points that hit the ground, in those of their axes: the last one is
+        upwards, those before it along the foot and across it.
+        """
         rows = [self._each * i + axis for i in sorted(points) for axis in axes]
         return np.array(rows, dtype=np.int64)
 
     def places(self, points: set[int], held: set[int]) -> Indices:
-        """Rows of the places of points that come to the ground while others are ``held`` there."""
+        """Return the rows of the places of points that come to the ground while others are ``held`` there."""
         return self._rows(points - held, points & held) + self._errors
 
     def _rows(self, points: set[int], others: set[int]) -> Indices:
@@ -98,7 +99,7 @@ def _independent(
     of_foot: tuple[str, ...], places: tuple[tuple[float, ...], ...], axes: tuple[int, ...],
     points: frozenset[int], others: frozenset[int],
 ) -> tuple[int, ...]:  # fmt: skip
-    """Those rows. Few sets occur, but at every knot of a problem, and robots begin in few stances."""
+    """Return the independent rows. Few sets occur, but at every knot of a problem, and robots begin in few stances."""
     rows = list[int]()
     place = np.array(places)
     for foot in dict.fromkeys(of_foot):
@@ -119,8 +120,9 @@ def _independent(
 
 
 def _motion(arm: Array, axis: int, axes: tuple[int, ...]) -> Array:
-    """How a foot's own motion, three velocities and three turns, moves a point along an axis; ``arm``
-    leads to the point. In the sagittal plane a foot turns about y only."""
+    """Return the effect of a foot's own motion, three velocities and three turns, on a point along an axis; ``arm``
+    leads to the point. In the sagittal plane a foot turns about y only.
+    """
     direction = np.eye(3)[axis]
     turns = np.cross(arm / LENGTH, direction)
     if 1 not in axes:
@@ -146,7 +148,7 @@ class Structure:
     """The knots of a task's problem in those coordinates.
 
     Attributes:
-        stretches: the phases with their intervals; ``of_knot`` that of every interval.
+        problem_phases: the phases with their intervals; ``of_knot`` that of every interval.
         given: by knot the variables that are given there, their values and families.
         knots: all of them, the end included.
     """
@@ -163,8 +165,12 @@ class Structure:
         self.n, self.forces = coordinates.size, coordinates.forces
         self._in_legs = {k for f in model.robot.feet for k in chain_to(model.robot, f.link)}
         self._lead(task, stances)
-        self.stretches = layout(task, model.robot)
-        self.of_knot = [stretch for stretch in self.stretches for _ in range(stretch.count)]
+        self.problem_phases = layout(task, model.robot)
+        self.of_knot = [
+            problem_phase
+            for problem_phase in self.problem_phases
+            for _ in range(problem_phase.count)
+        ]
         self.contact_rows = ContactRows(model.robot, coordinates, _along_feet(self.stances[0]))
         self.obstacles = ObstacleRows(model, coordinates)
         self.leg_pairs = len(fore_and_hind(model, coordinates))
@@ -175,33 +181,33 @@ class Structure:
     def _knots(self) -> list[Knot]:
         n, end = self.n, len(self.of_knot)
         knots = []
-        for k, stretch in enumerate(self.of_knot):
+        for k, problem_phase in enumerate(self.of_knot):
             before = self.of_knot[k - 1] if k else None
             after = self.of_knot[k + 1] if k + 1 < end else None
-            states = 2 * n + stretch.timed
-            holds = after is not None and after is not stretch and after.timed
-            own = n + (len(self.coordinates.turning) if stretch.flies else self.forces)
-            knot = Knot(states, own + holds, gap=stretch.piece)
+            states = 2 * n + problem_phase.timed
+            holds = after is not None and after is not problem_phase and after.timed
+            own = n + (len(self.coordinates.turning) if problem_phase.flies else self.forces)
+            knot = Knot(states, own + holds, gap=problem_phase.piece)
             knot.hold = own if holds else None
             take = np.arange(states + own)
-            knot.pieces[stretch.piece] = (take, self._interval_rows(stretch))
+            knot.pieces[problem_phase.piece] = (take, self._interval_rows(problem_phase))
             q_and_v = np.arange(2 * n)
-            if stretch.flies and k > stretch.first:
+            if problem_phase.flies and k > problem_phase.first:
                 knot.pieces["air"] = (np.arange(n), self._air_rows(k))
-            moment = self._moment_rows(before, stretch, k)
+            moment = self._moment_rows(before, problem_phase, k)
             if moment is not None:
                 knot.pieces["take_off"] = (q_and_v, moment)
             if before is not None:
-                kept = self._contact_rows(before, stretch)
+                kept = self._contact_rows(before, problem_phase)
                 if len(kept):
                     knot.pieces["contact"] = (q_and_v, kept)
             obstacle = self._obstacle_rows(k)
             if k and len(obstacle):
                 knot.pieces["obstacle"] = (np.arange(n), obstacle)
-            idle = self.idle(stretch)
-            if idle and k and not stretch.impact:
+            idle = self.idle(problem_phase)
+            if idle and k and not problem_phase.impact:
                 knot.pieces["air"] = (np.arange(n), np.array(idle))
-            self._give(k, knot, stretch, after if holds else None)
+            self._give(k, knot, problem_phase, after if holds else None)
             knots.append(knot)
         # The last interval leads to a knot that has no interval length among its states.
         self.given[end] = self._given_at_the_end()
@@ -214,8 +220,9 @@ class Structure:
         return [*knots, last]
 
     def _given_at_the_end(self) -> list[tuple[int, float, str]]:
-        """There the robot stands still, its base and what is in no leg where they are in the stance; the legs follow
-        from base and feet."""
+        """Return what is given at the end: the robot stands still, its base and what is in no leg where they are in the
+        stance; the legs follow from base and feet.
+        """
         at_rest = self.coordinates.reduce(self.stances[-1].coordinates)
         base = len(self.coordinates.free_base)
         free = [base + i for i, k in enumerate(self.coordinates.moving) if k not in self._in_legs]
@@ -223,7 +230,7 @@ class Structure:
         return values + [(self.n + i, 0.0, "stance") for i in range(self.n)]
 
     def moved(self, task: JumpTask, stances: Sequence[Stance]) -> Structure:
-        """That of a task of the same structure that leads elsewhere, see ``ProblemBuilder.moved``."""
+        """Return the structure for a task of the same structure that leads elsewhere, see ``ProblemBuilder.moved``."""
         found = copy(self)
         found._lead(task, stances)
         found.given = self.given | {len(self.of_knot): found._given_at_the_end()}
@@ -235,8 +242,10 @@ class Structure:
         self.hops, self.places = task.hops(), task.places()
         self._edges = [edge_of(hop, at) for hop, at in zip(self.hops, self.places, strict=False)]
 
-    def _give(self, k: int, knot: Knot, stretch: ProblemPhase, timed: ProblemPhase | None) -> None:
-        """What is given at a knot: the start, forces on points without contact, a next time."""
+    def _give(
+        self, k: int, knot: Knot, problem_phase: ProblemPhase, timed: ProblemPhase | None
+    ) -> None:
+        """Fix what is given at a knot: the start, forces on points without contact, a next time."""
         n, given = self.n, []
         if k == 0:
             start = self.coordinates.reduce(self.stances[0].coordinates)
@@ -244,7 +253,7 @@ class Structure:
             given += [(n + i, 0.0, "stance") for i in range(n)]
         every = len(self.coordinates.axes)
         first = knot.states + n
-        for point in self.idle(stretch):
+        for point in self.idle(problem_phase):
             given += [(first + point * every + i, 0.0, "friction") for i in range(every)]
         if timed is not None and timed.time is not None and knot.hold is not None:
             given.append((knot.states + knot.hold, timed.time / timed.count, "flight time"))
@@ -252,41 +261,42 @@ class Structure:
             self.given[k] = given
             knot.fixed = tuple(i for i, _, _ in given)
 
-    def idle(self, stretch: ProblemPhase) -> list[int]:
+    def idle(self, problem_phase: ProblemPhase) -> list[int]:
         """Return the contact variables' points that are not on the ground in a stance."""
-        if stretch.flies:
+        if problem_phase.flies:
             return []
-        on = reduced_contacts(self.coordinates, stretch.contacts)
+        on = reduced_contacts(self.coordinates, problem_phase.contacts)
         return [i for i in range(len(self.coordinates.contacts)) if i not in on]
 
-    def _interval_rows(self, stretch: ProblemPhase) -> NDArray[np.int64]:
-        """As ``_kept_rows``; worked out once for a stretch."""
-        if stretch not in self._kept:
-            self._kept[stretch] = self._kept_rows(stretch)
-        return self._kept[stretch]
+    def _interval_rows(self, problem_phase: ProblemPhase) -> NDArray[np.int64]:
+        """Return ``_kept_rows``, worked out once for a phase."""
+        if problem_phase not in self._kept:
+            self._kept[problem_phase] = self._kept_rows(problem_phase)
+        return self._kept[problem_phase]
 
-    def _kept_rows(self, stretch: ProblemPhase) -> NDArray[np.int64]:
-        """The rows of an interval that are kept: no friction where there is no contact, and
-        pressure only where a share is asked for and the whole foot is down."""
-        total, points = self.pieces[stretch.piece].rows, len(self.coordinates.contacts)
-        rows = np.arange(2 * self.n + stretch.timed, total)
-        if stretch.flies:
+    def _kept_rows(self, problem_phase: ProblemPhase) -> NDArray[np.int64]:
+        """Return the rows of an interval that are kept: no friction where there is no contact, and pressure only where
+        a share is required and the whole foot is down.
+        """
+        total, points = self.pieces[problem_phase.piece].rows, len(self.coordinates.contacts)
+        rows = np.arange(2 * self.n + problem_phase.timed, total)
+        if problem_phase.flies:
             return rows
         each = 2 * (len(self.coordinates.axes) - 1)
-        pressure = 0 if stretch.impact else points
+        pressure = 0 if problem_phase.impact else points
         cones = total - pressure - each * points
-        idle = [cones + each * point + i for point in self.idle(stretch) for i in range(each)]
+        idle = [cones + each * point + i for point in self.idle(problem_phase) for i in range(each)]
         if idle or self.task.margins is None or not self.task.margins.pressure:
             idle += range(total - pressure, total)
         return np.setdiff1d(rows, idle) if idle else rows
 
-    def _contact_rows(self, before: ProblemPhase, stretch: ProblemPhase) -> NDArray[np.int64]:
-        """Which rows hold the feet at the knot between two intervals."""
+    def _contact_rows(self, before: ProblemPhase, problem_phase: ProblemPhase) -> NDArray[np.int64]:
+        """Return the rows that hold the feet at the knot between two intervals."""
         held, now = (
             set() if s.flies else reduced_contacts(self.coordinates, s.contacts)
-            for s in (before, stretch)
+            for s in (before, problem_phase)
         )  # fmt: skip
-        if stretch.impact:
+        if problem_phase.impact:
             bounded = [
                 axis for axis, most in enumerate(self.touchdown_speeds()) if most is not None
             ]
@@ -308,7 +318,7 @@ class Structure:
         return [*[margins.touchdown_slide] * sideways, margins.touchdown_speed]
 
     def _air_rows(self, k: int) -> NDArray[np.int64]:
-        """Which rows are needed: how far ahead only where there is an edge."""
+        """Return the rows that are needed: the distance ahead only where there is an edge."""
         rows = self.pieces["air"].rows
         points = (rows - self.leg_pairs) // 3
         feet = len(self.coordinates.contacts)
@@ -330,23 +340,24 @@ class Structure:
 
     def _obstacle_rows(self, k: int) -> NDArray[np.int64]:
         hop, _, edge = self.hop_at(k)
-        stretch = self.phase_at(k)
-        return self.obstacles.rows(hop, edge, stretch, k == stretch.first)
+        problem_phase = self.phase_at(k)
+        return self.obstacles.rows(hop, edge, problem_phase, k == problem_phase.first)
 
     def _moment_rows(
-        self, before: ProblemPhase | None, stretch: ProblemPhase, k: int
+        self, before: ProblemPhase | None, problem_phase: ProblemPhase, k: int
     ) -> NDArray[np.int64] | None:
-        """What is asked for at a lift-off (apex or speed, angular momentum) or at a touchdown
-        (angular momentum); ``None`` at any other knot."""
-        lift_off = stretch.flies and k == stretch.first
+        """Return the rows of a lift-off (apex or speed, angular momentum) or a touchdown (angular momentum); ``None``
+        at any other knot.
+        """
+        lift_off = problem_phase.flies and k == problem_phase.first
         kept = []
         if lift_off:
-            hop = self.hops[stretch.place]
+            hop = self.hops[problem_phase.place]
             margins = self.task.margins
             least = None if margins is None else margins.lift_off_speed
             kept = [0] if hop.rise is not None else []
             kept += [1] if hop.take_off_speed is not None or least is not None else []
-        elif not self.is_touchdown(before, stretch) or self.task.touchdown_momentum is None:
+        elif not self.is_touchdown(before, problem_phase) or self.task.touchdown_momentum is None:
             return None
         most = self.task.lift_off_momentum if lift_off else self.task.touchdown_momentum
         if most is not None:
@@ -355,10 +366,10 @@ class Structure:
         return np.array(kept, dtype=np.int64)
 
     @staticmethod
-    def is_touchdown(before: ProblemPhase | None, stretch: ProblemPhase) -> bool:
-        """Whether a knot between two intervals is the first on the ground, behind any impact."""
+    def is_touchdown(before: ProblemPhase | None, problem_phase: ProblemPhase) -> bool:
+        """Check whether a knot between two intervals is the first on the ground, behind any impact."""
         landed = before is not None and (before.flies or before.impact)
-        return landed and not stretch.flies and not stretch.impact
+        return landed and not problem_phase.flies and not problem_phase.impact
 
     def step_under(self, k: int) -> tuple[float, float | None]:
         """Return the step's height and its edge under a flight."""
@@ -367,9 +378,10 @@ class Structure:
         return step_of(hop, self.places[place]), self._edges[place]
 
     def over_step(self, k: int) -> tuple[bool, bool]:
-        """Of a flight's knot whether feet are above the higher ground there, and whether they are
-        on the lower side of the edge. At the first knot of a step's later part both are true, or
-        they could cut the corner between that knot and the one before it."""
+        """Return whether feet are above the higher ground at a flight's knot, and whether they are on the lower side of
+        the edge. At the first knot of a step's later part both are true, or they could cut the corner between that knot
+        and the one before it.
+        """
         step, edge = self.step_under(k)
         switch = 0.5 if edge is None else STEP_UP_SHARE if step > 0.0 else STEP_DOWN_SHARE
         late, first = self.flight_share(k) >= switch, self.flight_share(k - 1) < switch
@@ -378,6 +390,8 @@ class Structure:
         return higher, lower_side and edge is not None
 
     def flight_share(self, k: int) -> float:
-        """How much of the flight's time is past at a knot of it."""
-        stretch = self.of_knot[k]
-        return float(stretch.lengths[: max(0, k - stretch.first)].sum() / stretch.count)
+        """Return the share of the flight's time that is past at a knot of it."""
+        problem_phase = self.of_knot[k]
+        return float(
+            problem_phase.lengths[: max(0, k - problem_phase.first)].sum() / problem_phase.count
+        )

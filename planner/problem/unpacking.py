@@ -1,5 +1,5 @@
-"""From the problem's variables to a plan, and from a plan of a near task to variables.
-A solve on another grid starts from a plan's motion at other instants of the same phases.
+"""Conversion of the problem's variables to a plan, and of a plan of a near task to variables. A solve on another grid
+starts from a plan's motion at other instants of the same phases.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Phases = Sequence[int]
 
 
 def segments(phases: Phases) -> list[tuple[int, int, int]]:
-    """Runs of intervals in one phase: (phase, first interval, one behind the last)."""
+    """Return the runs of intervals in one phase: (phase, first interval, one behind the last)."""
     found, start = [], 0
     for phase, group in groupby(int(phase) for phase in phases):
         stop = start + len(list(group))
@@ -33,13 +33,13 @@ def segments(phases: Phases) -> list[tuple[int, int, int]]:
 
 
 def same_phases(first: Phases, second: Phases) -> bool:
-    """Whether both go through the same phases in the same order."""
+    """Check whether both go through the same phases in the same order."""
     return [s[0] for s in segments(first)] == [s[0] for s in segments(second)]
 
 
 def matching_times(time: Array, phases: Phases, steps: Array, others: Phases) -> Array:
-    """For every knot of a grid (interval lengths ``steps`` in phases ``others``) the instant of the
-    motion with knots at ``time`` and intervals in ``phases`` that is as far into the same phase.
+    """Return for every knot of a grid (interval lengths ``steps`` in phases ``others``) the instant of the motion with
+    knots at ``time`` and intervals in ``phases`` that is as far into the same phase.
 
     Only the proportions of ``steps`` within a phase count. (n_steps + 1,)
     """
@@ -51,8 +51,9 @@ def matching_times(time: Array, phases: Phases, steps: Array, others: Phases) ->
 
 
 def states_at(instants: Array, time: Array, place: Array, rate: Array) -> tuple[Array, Array]:
-    """Places and rates at those instants between knots: places by the cubic through both ends'
-    places and rates, rates linearly."""
+    """Return places and rates at those instants between knots: places by the cubic through both ends' places and rates,
+    rates linearly.
+    """
     k = np.clip(np.searchsorted(time, instants + 1e-12, side="right") - 1, 0, len(time) - 2)
     h = (time[k + 1] - time[k])[:, None]
     u = (instants[:, None] - time[k][:, None]) / h
@@ -64,8 +65,9 @@ def states_at(instants: Array, time: Array, place: Array, rate: Array) -> tuple[
 
 
 def means_over(instants: Array, time: Array, values: Array) -> Array:
-    """Of what is constant over the intervals of ``time`` (rows of ``values``) the means between
-    the instants, (n_instants - 1, ...)."""
+    """Return the means between the instants of what is constant over the intervals of ``time`` (rows of ``values``),
+    (n_instants - 1, ...).
+    """
     total = np.concatenate(
         [np.zeros_like(values[:1]), np.cumsum(np.diff(time)[:, None] * values[: len(time) - 1], 0)]
     )
@@ -77,8 +79,10 @@ def knot_times(problem: FullProblem, values: Array) -> Array:
     """Return the time of every knot [s]."""
     n, assembly = problem.coordinates.size, problem.assembly
     steps = problem.steps.copy()
-    for stretch in problem.stretches:
-        for k in range(stretch.first, stretch.stop if stretch.timed else stretch.first):
+    for problem_phase in problem.problem_phases:
+        for k in range(
+            problem_phase.first, problem_phase.stop if problem_phase.timed else problem_phase.first
+        ):
             steps[k] *= values[assembly.state_start[k] + 2 * n]
     return np.concatenate([[0.0], np.cumsum(steps)])
 
@@ -93,18 +97,18 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
     bend, force = np.zeros((count, model.size)), np.zeros((count, 3 * len(model.robot.contacts)))
     grounded = np.zeros((count, len(model.robot.contacts)), dtype=bool)
     impacts = np.zeros(count, dtype=bool)
-    for stretch in problem.stretches:
-        here = slice(stretch.first, stretch.stop)
+    for problem_phase in problem.problem_phases:
+        here = slice(problem_phase.first, problem_phase.stop)
         control = assembly.control_start[here, None] + np.arange(n)
-        impacts[here] = stretch.impact
-        grounded[here, list(stretch.contacts)] = True
-        if not stretch.impact:
+        impacts[here] = problem_phase.impact
+        grounded[here, list(problem_phase.contacts)] = True
+        if not problem_phase.impact:
             bend[here] = values[control] @ coordinates.matrix.T
-        if not stretch.flies:
+        if not problem_phase.flies:
             pushed = values[control[:, :1] + n + np.arange(coordinates.forces)]
             force[here] = pushed @ coordinates.force_matrix.T
             force.reshape(count, -1, 3)[here][~grounded[here]] = 0.0
-            _turn_forces(problem, stretch, force[here], to_world=True)
+            _turn_forces(problem, problem_phase, force[here], to_world=True)
     phases = [int(phase) for phase in problem.phases]
     for array in (bend, force, grounded):
         array[-1] = array[-2]
@@ -136,11 +140,11 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
 
 
 def _turn_forces(
-    problem: FullProblem, stretch: ProblemPhase, force: Array, *, to_world: bool
+    problem: FullProblem, problem_phase: ProblemPhase, force: Array, *, to_world: bool
 ) -> None:
-    """Turn the forces in a stretch (n, 3 n_contacts) from the axes of the ground that it stands on to the
+    """Turn the forces in a phase (n, 3 n_contacts) from the axes of the ground that it stands on to the
     world's, or back, in place."""
-    slope = problem.stances[stretch.place].slope
+    slope = problem.stances[problem_phase.place].slope
     if slope != LEVEL:
         axes = ground_axes(slope)
         for each in force:
@@ -151,7 +155,7 @@ def _middles_in_flight(
     problem: FullProblem, values: Array, steps: Array,
     q: Array, v: Array, middle: Array, moving: Array,
 ) -> None:  # fmt: skip
-    """Angles and rates of the base in the middle of intervals in flight; see ``exact_flight``."""
+    """Compute the angles and rates of the base in the middle of intervals in flight; see ``exact_flight``."""
     coordinates, assembly = problem.coordinates, problem.assembly
     own = list(coordinates.turning)
     base = slice(3, 6)
@@ -166,16 +170,18 @@ def _middles_in_flight(
 
 
 def can_start(problem: FullProblem, plan: PlannedJump) -> bool:
-    """Whether a plan goes through the same phases, so that ``pack`` can make variables of it."""
-    impacts = bool(np.any(np.diff(plan.time) <= 0.0)) or any(s.impact for s in problem.stretches)
+    """Check whether a plan goes through the same phases, so that ``pack`` can make variables of it."""
+    impacts = bool(np.any(np.diff(plan.time) <= 0.0)) or any(
+        s.impact for s in problem.problem_phases
+    )
     alike = same_phases(plan.phase[:-1].tolist(), [int(phase) for phase in problem.phases])
     return _same_grid(problem, plan) or (alike and not impacts)
 
 
 def _same_grid(problem: FullProblem, plan: PlannedJump) -> bool:
-    """Whether all intervals stand for the same; only then can there be impacts."""
+    """Check whether all intervals stand for the same; only then can there be impacts."""
     intervals = len(plan.time) == problem.knots
-    impacts = {s.first for s in problem.stretches if s.impact}
+    impacts = {s.first for s in problem.problem_phases if s.impact}
     return (
         intervals
         and plan.phase[:-1].tolist() == [int(phase) for phase in problem.phases]
@@ -184,7 +190,7 @@ def _same_grid(problem: FullProblem, plan: PlannedJump) -> bool:
 
 
 def pack(problem: FullProblem, plan: PlannedJump, guess: Array | None = None) -> Array:
-    """Variables near a plan of a task like this one.
+    """Return variables near a plan of a task like this one.
 
     The plan may have other numbers of knots: it is followed phase by phase, and must go through
     the same phases. Only then the interval lengths of a ``guess`` are needed.
@@ -204,33 +210,38 @@ def pack(problem: FullProblem, plan: PlannedJump, guess: Array | None = None) ->
     values = np.empty(assembly.variables)
     place, rate = coordinates.reduce(q), coordinates.reduce(v)
     force = force.copy()
-    for stretch in problem.stretches:
-        _turn_forces(problem, stretch, force[stretch.first : stretch.stop], to_world=False)
+    for problem_phase in problem.problem_phases:
+        _turn_forces(
+            problem, problem_phase, force[problem_phase.first : problem_phase.stop], to_world=False
+        )
     pushes = coordinates.reduce_forces(force)
     own = np.arange(n)
     values[assembly.state_start[:, None] + own] = place
     values[assembly.state_start[:, None] + n + own] = rate
     turning = np.array(coordinates.turning, dtype=np.int64)
     before: int | None = None
-    for stretch in problem.stretches:
-        here = slice(stretch.first, stretch.stop)
-        behind = slice(stretch.first + 1, stretch.stop + 1)
+    for problem_phase in problem.problem_phases:
+        here = slice(problem_phase.first, problem_phase.stop)
+        behind = slice(problem_phase.first + 1, problem_phase.stop + 1)
         control = assembly.control_start[here, None]
-        step = 1.0 if stretch.impact else steps[here, None]
+        step = 1.0 if problem_phase.impact else steps[here, None]
         values[control + own] = (rate[behind] - rate[here]) / step
-        if stretch.flies:
+        if problem_phase.flies:
             turned = (place[behind] - place[here]) / steps[here, None]
             rates = 1.5 * turned - 0.25 * (rate[here] + rate[behind])
             values[control + n + np.arange(len(turning))] = rates[:, turning]
         else:
             values[control + n + np.arange(coordinates.forces)] = pushes[here]
-        mean = float(instants[stretch.stop] - instants[stretch.first]) / stretch.count
-        if stretch.timed:
+        mean = (
+            float(instants[problem_phase.stop] - instants[problem_phase.first])
+            / problem_phase.count
+        )
+        if problem_phase.timed:
             values[assembly.state_start[here] + 2 * n] = mean
         hold = None if before is None else assembly.knots[before].hold
         if before is not None and hold is not None:
             values[assembly.control_start[before] + hold] = mean
-        before = stretch.stop - 1
+        before = problem_phase.stop - 1
     return values
 
 
@@ -264,8 +275,9 @@ def _evaluate(
     model: SymbolicModel, q: Array, v: Array, middle: Array, moving: Array, bend: Array,
     force: Array,
 ) -> tuple[Array, Array, Array, Array]:  # fmt: skip
-    """Centre of mass, its velocity and the angular momentum at the knots; joint torques in the
-    middle of the intervals."""
+    """Return the centre of mass, its velocity and the angular momentum at the knots; joint torques in the middle of the
+    intervals.
+    """
     key = id(model), len(q)
     if key not in _evaluators:
         if len(_evaluators) >= KEPT:
@@ -284,7 +296,9 @@ _of_models: dict[int, tuple[SymbolicModel, Any, Any]] = {}
 
 
 def _functions(model: SymbolicModel, pushed: int) -> tuple[Any, Any]:
-    """What ``_evaluate`` gives, of one instant: of a state, and joint torques under ``pushed`` forces."""
+    """Return the functions of one instant that ``_evaluate`` needs: of a state, and joint torques under ``pushed``
+    forces.
+    """
     import casadi as ca
 
     if id(model) not in _of_models:

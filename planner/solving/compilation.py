@@ -31,8 +31,9 @@ from ..task.scaling import per_robot
 from ..task.task import Knots
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off")
-"""No flags of one machine's: its libraries may be kept where other machines find them, and plans
-are the same everywhere. Higher optimisation takes twice as long to compile and gains nothing."""
+"""Compiler flags, none of one machine's: its libraries may be kept where other machines find them, and plans are the
+same everywhere. Higher optimisation takes twice as long to compile and gains nothing.
+"""
 OPTIMISED = ("stance", "free_stance", "contact")
 """The pieces of most knots. Others are compiled without optimisation, which takes a fifth of the time:
 their functions are long and have no loops, so the compiler spends it on assigning registers. Results are
@@ -55,7 +56,7 @@ Progress = Callable[[str, int, int], None]
 
 
 def cache_folder() -> Path:
-    """Where compiled libraries are kept: the user's cache directory."""
+    """Return the folder of compiled libraries: the user's cache directory."""
     root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(root) / "aloft" / "planner"
 
@@ -166,7 +167,7 @@ def _load(
 
 @contextmanager
 def _claimed(library: Path, compiler: str | None, *, wait: bool) -> Iterator[bool]:
-    """Whether a library that is missing is this process's to make, so that no two make the same.
+    """Claim a missing library for this process, so that no two make the same; yield whether it is this one's to make.
 
     With ``wait`` it becomes so when the other process is done or has died. Where files cannot be
     locked, and where nothing is to be made, it always is.
@@ -225,7 +226,7 @@ def _compile(compiler: str, piece: StageFunction, library: Path) -> bool:
 
 @contextmanager
 def made_aside(library: Path) -> Iterator[Path]:
-    """Where to make a library that takes its place at the end: other processes see the whole one or none.
+    """Make a library in a folder apart and move it to its place at the end: other processes see the whole one or none.
 
     Raises:
         OSError: the folder cannot be written.
@@ -250,7 +251,7 @@ def run_compiler(compiler: str, source: Path, library: Path, *flags: str) -> Non
 
 @dataclass(frozen=True)
 class SolveOptions:
-    """What every formulation takes beside the task and the robot.
+    """Options of every formulation beside the task and the robot.
 
     Attributes:
         warm_start: a plan of a near task, on any grid; one that goes through other phases is not

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.welding import WeldedRobot
 from ..models.exact_dynamics import ExactDynamics
 from ..problem.program import SimpleProblem, joint_torques
 from ..task.files import PlanError
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.task import JumpTask
 from .solver import Solution
@@ -39,7 +39,7 @@ ADVICE = {
 
 
 def statistics_of(problem: SimpleProblem, solution: Solution) -> dict[str, Any]:
-    """How a problem on a fixed grid was solved, for the plan; the whole time comes to it later."""
+    """Return the solver's statistics of a problem on a fixed grid, for the plan; the whole time is added later."""
     return {
         "solver": solution.solver,
         "iterations": solution.iterations,
@@ -70,7 +70,7 @@ def failure(task: JumpTask, solution: Solution) -> PlanError:
 
 
 def versions() -> dict[str, str]:
-    """Of the packages that decide what a plan is."""
+    """Return the versions of the packages on which a plan depends."""
     import casadi as ca
 
     return {"casadi": str(ca.CasadiMeta.version()), "numpy": np.__version__}

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
@@ -14,6 +13,7 @@ from ..models.robot_model import model_of, stances_of
 from ..problem import paper_problem as stages
 from ..problem.paper_problem import PaperProblemBuilder
 from ..problem.program import SimpleProblem
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.task import JumpTask
 from .compilation import FunctionSet, Progress, SolveOptions, load_functions

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
@@ -27,6 +26,7 @@ from ..problem import rigid_body_problem as stages
 from ..problem.program import SimpleProblem
 from ..problem.rigid_body_problem import STATES, RigidBodyProblemBuilder
 from ..task.files import PlanError
+from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.task import JumpTask
 from .compilation import FunctionSet, Progress, SolveOptions, load_functions
@@ -67,7 +67,7 @@ class FeetPath:
         return com + offset + self._shape() @ _turned(heading).T, heading
 
     def _middle(self, which: int) -> Array:
-        """From the centre of mass to the middle of the points, on the ground."""
+        """Return the vector from the centre of mass to the middle of the points, on the ground."""
         return np.asarray(self.stances[which].points.mean(axis=0) - self.com[which])
 
     def _shape(self) -> Array:
@@ -148,7 +148,7 @@ class WholeBodyPose:
 def whole_body(
     model: SymbolicModel, path: FeetPath, times: Array, body: Array, rates: Array, first: Array
 ) -> tuple[Array, Array]:
-    """Coordinates and rates (N, n_velocities) at the knots, beginning with the pose ``first``.
+    """Return the coordinates and rates (N, n_velocities) at the knots, beginning with the pose ``first``.
 
     ``body`` and ``rates`` (N, 6) are centre of mass, pitch, roll and yaw, and their derivatives.
     """

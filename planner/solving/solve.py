@@ -18,7 +18,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...robots.welding import welded
@@ -38,6 +37,7 @@ from ..problem.stage_functions import PIECES, SLOPED, SLOPED_PIECES, make_coordi
 from ..problem.structure import is_mirrored
 from ..problem.unpacking import can_start, knot_times, pack, segments, unpack
 from ..task.files import JumpTaskError, PlanError, need_planner
+from ..task.phase import Phase
 from ..task.plan import ARRAYS, PlannedJump
 from ..task.recipe import choices
 from ..task.sequence import PHASES, Hop
@@ -49,33 +49,33 @@ from .rigid_body_plan import solve_rigid_body
 from .solver import LIMIT, NEAR, Solution, solve
 from .solver_process import cpu_time
 
-EASES = (1.4, 2.0)
-"""Times the real motor limits that a first motion is looked for with."""
+RELAXATIONS = (1.4, 2.0)
+"""Multiples of the real motor limits with which a first motion is sought."""
 FIRST_STEP, LAST_STEP = 0.1, 0.02
-"""By how much the limits come down at a time; halved where the solver does not follow."""
+"""Steps by which the limits come down; halved where the solver does not follow."""
 COLD_LIMIT, WARM_LIMIT = 250, 100
 """Iterations."""
 
 
-def eased(problem: FullProblem, ease: float) -> FullProblem:
-    """Return the problem with motor limits ``ease`` times as high."""
+def relaxed(problem: FullProblem, relaxation: float) -> FullProblem:
+    """Return the problem with motor limits ``relaxation`` times as high."""
     motors = np.array([family.startswith("motor") for family in problem.families])
-    scale = np.where(motors, ease, 1.0)
+    scale = np.where(motors, relaxation, 1.0)
     return replace(
         problem, row_lower=problem.row_lower * scale, row_upper=problem.row_upper * scale
     )
 
 
-def tighten(problem: FullProblem, values: Array, ease: float) -> Solution | None:
-    """Return a solution of the problem, from one of the problem eased so much; ``None`` if none is reached."""
+def tighten(problem: FullProblem, values: Array, relaxation: float) -> Solution | None:
+    """Return a solution of the problem, from one of the problem relaxed so much; ``None`` if none is reached."""
     step, found = FIRST_STEP, None
     iterations, cpu = 0, 0.0
-    while ease > 1.0 or found is None:
-        to = max(1.0, ease - step)
-        trial = solve(eased(problem, to), values, warm=True, solver="fatrop", limit=WARM_LIMIT)
+    while relaxation > 1.0 or found is None:
+        to = max(1.0, relaxation - step)
+        trial = solve(relaxed(problem, to), values, warm=True, solver="fatrop", limit=WARM_LIMIT)
         iterations, cpu = iterations + trial.iterations, cpu + trial.cpu
         if trial.solved:
-            values, ease, found = trial.values, to, trial
+            values, relaxation, found = trial.values, to, trial
             continue
         step /= 2.0
         if step < LAST_STEP:
@@ -83,12 +83,12 @@ def tighten(problem: FullProblem, values: Array, ease: float) -> Solution | None
     return replace(found, iterations=iterations, cpu=cpu)
 
 
-def from_eased(problem: FullProblem, guess: Array) -> Solution | None:
-    """Return a solution of the problem from a rough guess, by way of eased ones."""
-    for ease in EASES:
-        first = solve(eased(problem, ease), guess, solver="fatrop", limit=COLD_LIMIT)
+def from_relaxed(problem: FullProblem, guess: Array) -> Solution | None:
+    """Return a solution of the problem from a rough guess, by way of relaxed ones."""
+    for relaxation in RELAXATIONS:
+        first = solve(relaxed(problem, relaxation), guess, solver="fatrop", limit=COLD_LIMIT)
         if first.solved:
-            found = tighten(problem, first.values, ease)
+            found = tighten(problem, first.values, relaxation)
             if found is not None:
                 return replace(found, iterations=found.iterations + first.iterations)
     return None
@@ -107,10 +107,10 @@ def with_impacts(plan: PlannedJump) -> PlannedJump:
 
 
 FACTOR = 1.5
-"""How many times as many intervals a plan is solved on again."""
+"""Factor on the number of intervals when a plan is solved again."""
 ROUNDS = 2
-"""How often at most."""
-CURABLE = frozenset(
+"""Greatest number of such repetitions."""
+RELAXABLE = frozenset(
     {
         "position_defect", "rotation_defect", "velocity_defect", "angular_velocity_defect",
         "flight_position", "flight_rotation", "rise", "joint_torque", "joint_limits",
@@ -120,22 +120,23 @@ CURABLE = frozenset(
     }
 )  # fmt: skip
 """Tests whose figures depend on the length of the intervals."""
-CURABLE_EXCESS = 8.0
+RELAXABLE_EXCESS = 8.0
 """A figure further than this many times its limit is no error of the grid."""
 
 
-def curable(plan: PlannedJump) -> bool:
-    """Whether a plan with its report failed by what finer intervals may cure."""
+def relaxable(plan: PlannedJump) -> bool:
+    """Check whether a plan with its report failed by what finer intervals may cure."""
     failed = [test for test in plan.report.get("tests", []) if not test["passed"]]
     return bool(failed) and all(
-        test["name"] in CURABLE and test["value"] <= CURABLE_EXCESS * max(test["limit"], 1e-3)
+        test["name"] in RELAXABLE and test["value"] <= RELAXABLE_EXCESS * max(test["limit"], 1e-3)
         for test in failed
     )
 
 
 def finer_knots(plan: PlannedJump) -> Knots:
-    """Numbers of intervals for solving a plan's task again; of several phases of a kind the one
-    with the most counts."""
+    """Return numbers of intervals for solving a plan's task again; of several phases of a kind the one with the most
+    counts.
+    """
     count = dict.fromkeys(("squat", "thrust", "flight", "landing"), 4)
     for phase, start, stop in segments(plan.phase[:-1].tolist()):
         name = Phase(phase).name.lower()
@@ -151,15 +152,15 @@ def with_knots(task: JumpTask, knots: Knots) -> JumpTask:
     if task.phases is not None and knots != task.knots:
         more = knots.total / task.knots.total
         changed["phases"] = tuple(
-            span if span.knots is None
-            else span.model_copy(update={"knots": math.ceil(more * span.knots)})
-            for span in task.phases
+            phase_spec if phase_spec.knots is None
+            else phase_spec.model_copy(update={"knots": math.ceil(more * phase_spec.knots)})
+            for phase_spec in task.phases
         )  # fmt: skip
     return task.model_copy(update=changed)
 
 
 def asks_for_finer(task: JumpTask, plan: PlannedJump | None) -> bool:
-    """Whether the plan to start from is a failed plan of the same task."""
+    """Check whether the plan to start from is a failed plan of the same task."""
     return (
         plan is not None
         and bool(plan.report)
@@ -176,8 +177,9 @@ LAST = 60
 """Iterations of IPOPT for one jump with all coordinates, where each takes 60 to 90 ms; all plans that it has
 found there took fewer."""
 Formulation = Callable[[JumpTask, RobotDescription, SolveOptions], PlannedJump]
-"""Makes a plan of a task with one set of decision variables, cost and constraints; the plan leaves
-out the robot's held joints."""
+"""Maker of a plan of a task with one set of decision variables, cost and constraints; the plan leaves out the robot's
+held joints.
+"""
 
 
 def solve_jump(
@@ -223,7 +225,7 @@ def solve_jump(
 
 
 def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> PlannedJump:
-    """Return the ``full`` formulation: the whole body's dynamics with its motors' limits; see ``problem``."""
+    """Solve the ``full`` formulation: the whole body's dynamics with its motors' limits; see ``problem``."""
     started = cpu_time()
     warm_start, solver = options.warm_start, options.solver
     knots = options.knots
@@ -291,11 +293,11 @@ FORMULATIONS: Mapping[str, Formulation] = {
     "paper": solve_paper,
     "srbm": solve_rigid_body,
 }
-"""By the name a task gives."""
+"""Formulations by the name in a task."""
 
 
 _coordinates = lru_cache(maxsize=16)(make_coordinates)
-"""Those of a model, made once."""
+"""Coordinates of a model, made once."""
 
 
 def make_problem(
@@ -320,8 +322,8 @@ def make_problem(
 def problems_like(
     task: JumpTask, robot: RobotDescription, *, coordinates: str
 ) -> Callable[[JumpTask], FullProblem]:
-    """Makes the problems of tasks that differ from one only in where they lead; see ``ProblemBuilder.moved``. The tasks
-    must have been resolved.
+    """Return a maker of the problems of tasks that differ from one only in where they lead; see
+    ``ProblemBuilder.moved``. The tasks must have been resolved.
 
     Raises ``PlanError`` and ``JumpTaskError`` as ``solve_jump`` does.
     """
@@ -336,28 +338,36 @@ def _builder(
     task: JumpTask, robot: RobotDescription, compiled: bool, progress: Progress | None, coordinates: str,
     *, twin: bool = False,
 ) -> ProblemBuilder:  # fmt: skip
-    """See ``make_problem``; ``twin`` takes the robot's mirrored twin where it is not the same left and right."""
+    """Return the builder of ``make_problem``; ``twin`` takes the robot's mirrored twin where it is not the same left
+    and right.
+    """
     robot, task = task.equipped(robot), task.resolved(robot)
     exact, finder = model_of(robot)
     model, stances = exact, stances_of(task, robot, finder)
-    stretches = layout(task, robot)
+    problem_phases = layout(task, robot)
     chosen = None
     wanted = (coordinates,) if coordinates else _mirrors(task)
     if any(name != "full" for name in wanted):
         alike, finder = (twin and twin_model_of(robot)) or symmetric_model_of(robot)
         placed = stances_of(task, robot, finder)
-        chosen = _choose(alike, wanted, placed, stretches)
+        chosen = _choose(alike, wanted, placed, problem_phases)
         if chosen is not None:
             model, stances = alike, placed
     if chosen is None:
         if coordinates not in ("", "full"):
             raise ValueError(f"{robot.name} does not do this jump in {coordinates} coordinates")
         chosen = _coordinates(exact, "full")
-    free = any(stretch.timed and not stretch.flies for stretch in stretches)
+    free = any(problem_phase.timed and not problem_phase.flies for problem_phase in problem_phases)
     if free and chosen.name == "full" and not coordinates:
         given = with_ground_times(task, robot, compiled=compiled, progress=progress)
         return _builder(given, robot, compiled, progress, "")
-    used = {"contact", "take_off", "air", "obstacle", *(stretch.piece for stretch in stretches)}
+    used = {
+        "contact",
+        "take_off",
+        "air",
+        "obstacle",
+        *(problem_phase.piece for problem_phase in problem_phases),
+    }
     names = tuple(name for name in PIECES if name in used)
     if task.leans:
         names = tuple(SLOPED + name if name in SLOPED_PIECES else name for name in names)
@@ -375,7 +385,7 @@ def _mirrors(task: JumpTask) -> tuple[str, ...]:
 
 def _choose(
     model: SymbolicModel, names: tuple[str, ...], stances: tuple[Stance, ...],
-    stretches: tuple[ProblemPhase, ...],
+    problem_phases: tuple[ProblemPhase, ...],
 ) -> Coordinates | None:  # fmt: skip
     """Return the first of these coordinates that the stances and the contacts allow."""
     every = np.array([stance.coordinates for stance in stances])
@@ -384,7 +394,7 @@ def _choose(
             found = _coordinates(model, name)
         except ValueError:
             return None
-        stands = all(is_mirrored(found, stretch.contacts) for stretch in stretches)
+        stands = all(is_mirrored(found, problem_phase.contacts) for problem_phase in problem_phases)
         if stands and found.contains(every):
             return found
     return None
@@ -397,7 +407,7 @@ def with_ground_times(
     """Return the task with all times on the ground given: those that are free are found for the same jumps straight
     ahead, or are usual ones where these cannot be planned.
     """
-    times = [USUAL_TIMES.get(PHASES[span.phase], 0.0) for span in task.spans()]
+    times = [USUAL_TIMES.get(PHASES[phase_spec.phase], 0.0) for phase_spec in task.phase_specs()]
     straight = straight_ahead(task).model_copy(update={"impact": False})
     usual = with_times(straight, times)
     if make_problem(usual, robot, compiled=compiled, progress=progress).coordinates.name != "full":
@@ -405,16 +415,16 @@ def with_ground_times(
         solution = solve(problem, ballistic_guess(problem), solver="fatrop")
         if solution.solved:
             knots = knot_times(problem, solution.values)
-            times = [float(knots[s.stop] - knots[s.first]) for s in problem.stretches]
+            times = [float(knots[s.stop] - knots[s.first]) for s in problem.problem_phases]
     return with_times(task, times)
 
 
 def with_times(task: JumpTask, times: list[float]) -> JumpTask:
     """Return the task with those times [s] of its phases where they are free, except for flights."""
     phases = tuple(
-        span if span.phase == "flight" or span.time is not None
-        else span.model_copy(update={"time": round(time, 6)})
-        for span, time in zip(task.spans(), times, strict=True)
+        phase_spec if phase_spec.phase == "flight" or phase_spec.time is not None
+        else phase_spec.model_copy(update={"time": round(time, 6)})
+        for phase_spec, time in zip(task.phase_specs(), times, strict=True)
     )  # fmt: skip
     return task.model_copy(update={"phases": phases})
 
@@ -451,14 +461,16 @@ def _barrier(problem: FullProblem) -> float:
 
 
 def _last(problem: FullProblem) -> int:
-    """Iterations that the last attempt may take. Longer ones leave no time to look for a task that can be planned."""
+    """Return the iterations that the last attempt may take. Longer ones leave no time to look for a task that can be
+    planned.
+    """
     hops = problem.task.hops()
     alone = len(hops) == 1 and not hops[0].rotation
     return LAST if alone and problem.coordinates.name == "full" else LIMIT
 
 
 def _leaves_plane(problem: FullProblem, plan: PlannedJump) -> bool:
-    """Whether a problem has all coordinates, and a plan of it would start from one that has not."""
+    """Check whether a problem has all coordinates, and a plan of it would start from one that has not."""
     return problem.coordinates.name == "full" and plan.statistics.get("coordinates") != "full"
 
 
@@ -486,17 +498,17 @@ def _displaced(problem: FullProblem, robot: RobotDescription) -> Array | None:
 
 def _turning(problem: FullProblem, robot: RobotDescription, guess: Array) -> Solution | None:
     """Return a somersault by way of stronger motors; one with impacts also by way of one without."""
-    found = from_eased(problem, guess)
+    found = from_relaxed(problem, guess)
     if found is not None or not problem.task.impact:
         return found
     task = problem.task.model_copy(update={"impact": False})
     gentle = make_problem(task, robot, compiled=not problem.assembly.interpreted)
-    for ease in EASES:
-        first = solve(eased(gentle, ease), ballistic_guess(gentle), solver="fatrop")
+    for relaxation in RELAXATIONS:
+        first = solve(relaxed(gentle, relaxation), ballistic_guess(gentle), solver="fatrop")
         if not first.solved:
             continue
         plan = with_impacts(PlannedJump(task=task, **unpack(gentle, first.values)))
-        found = tighten(problem, pack(problem, plan, guess), ease)
+        found = tighten(problem, pack(problem, plan, guess), relaxation)
         if found is not None:
             return found
     return None

@@ -12,22 +12,22 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ..problem.assembly import Assembly, NonlinearProgram
-from .solver_process import call_bounded, call_solver, cpu_time, quiet
+from .solver_process import call_bounded, call_solver, cpu_time, without_output
 
 VIOLATION = 1e-6
-"""What a solution may violate a constraint by, in the constraint's unit."""
+"""Tolerance of a solution for each constraint, in the constraint's unit."""
 DUAL_TOLERANCE = 1e-4
 """fatrop's dual infeasibility does not fall much further; the cost is then stable to 7 digits."""
 LIMIT = 150
 """Iterations; where fatrop finds a motion at all it nearly always does in half as many, and IPOPT
 finds it often where it does not."""
-PATIENCE = 1e-5
+TIME_PER_ENTRY = 1e-5
 """s of processor time for each iteration, state and constraint of the problem, about three times what one takes:
 a solver that restores feasibility without counting, or looks for a step for ever, is given up."""
 FAR, NEAR = 10.0, 1e-4
 """The barrier's parameter to begin with, far from a solution and near one."""
 PUSH = 1e-6
-"""How far a start near a solution is moved away from bounds."""
+"""Distance by which a start near a solution is moved away from bounds."""
 KEPT = 12
 """Solvers kept for problems of the same structure."""
 
@@ -97,7 +97,7 @@ def _run(
     }  # fmt: skip
     # In a copy of a process: a fatrop that has failed once would fail at easy problems later.
     if name == "fatrop":
-        ended, answer = call_bounded(function, arguments, patience(problem.assembly, limit))
+        ended, answer = call_bounded(function, arguments, time_limit(problem.assembly, limit))
         if not ended or answer is None:
             spent = cpu_time() - started
             return Solution(guess, name, 0, np.inf, np.inf, "dynamics", False, spent)
@@ -115,9 +115,9 @@ def _run(
     )  # fmt: skip
 
 
-def patience(assembly: Assembly, limit: int) -> int:
-    """How long fatrop may take for so many iterations [s of processor time]; IPOPT, twice as long."""
-    return max(2, math.ceil(PATIENCE * limit * (sum(assembly.nx) + assembly.constraints)))
+def time_limit(assembly: Assembly, limit: int) -> int:
+    """Return the time that fatrop may take for so many iterations [s of processor time]; IPOPT, twice as long."""
+    return max(2, math.ceil(TIME_PER_ENTRY * limit * (sum(assembly.nx) + assembly.constraints)))
 
 
 def violation_of(problem: NonlinearProgram, values: Array, constraint: Any) -> tuple[float, str]:
@@ -170,7 +170,7 @@ def _make_solver(assembly: Assembly, name: str, barrier: float, limit: int) -> t
         }  # fmt: skip
     else:
         own |= {"sb": "yes", "mu_init": barrier}
-        own["max_cpu_time"] = 2.0 * patience(assembly, limit)
+        own["max_cpu_time"] = 2.0 * time_limit(assembly, limit)
         if barrier < FAR:
             own |= {"bound_push": PUSH, "bound_frac": PUSH,
                     "slack_bound_push": PUSH, "slack_bound_frac": PUSH}  # fmt: skip
@@ -178,6 +178,6 @@ def _make_solver(assembly: Assembly, name: str, barrier: float, limit: int) -> t
             "hess_lag": functions["hess_lag"], "jac_g": functions["nlp_jac_g"],
             "grad_f": functions["grad_f"], "no_nlp_grad": True, "ipopt": own,
         }  # fmt: skip
-    with quiet():
+    with without_output():
         made = ca.nlpsol("jump", name, nlp, options)
     return made, functions["nlp_f"], functions["nlp_g"]

@@ -25,7 +25,7 @@ from ...processes.child_process import ChildProcess
 
 
 def cpu_time() -> float:
-    """Processor time [s] of this process, of those it has waited for, and what others counted."""
+    """Return the processor time [s] of this process, of those it has waited for, and what others counted."""
     if not hasattr(os, "fork"):
         return time.process_time()
     import resource
@@ -44,8 +44,8 @@ def count(seconds: float) -> None:
 
 
 def bounded(function: Callable[[], Any], limit: int) -> tuple[bool, Any]:
-    """Whether ``function`` came to its end within ``limit`` seconds of processor time, and what it
-    returned, which has to be picklable.
+    """Return whether ``function`` came to its end within ``limit`` seconds of processor time, and its result, which has
+    to be picklable.
 
     It is called in a copy of this process, so it changes nothing here. Where processes cannot be
     copied it is called here, without a limit.
@@ -73,7 +73,7 @@ def bounded(function: Callable[[], Any], limit: int) -> tuple[bool, Any]:
 
 
 def _answer(function: Callable[[], Any], limit: int, writing: int) -> None:
-    """In the copy: do it, write the answer, and end without anything else."""
+    """Call the function in the copy of the process, write the answer, and end without anything else."""
     import resource
 
     # What this process has used so far does not count, and was not passed on.
@@ -94,7 +94,7 @@ KEPT = 12
 
 
 def has_one_thread() -> bool:
-    """Whether this process has no thread but the one that asks."""
+    """Check whether this process has no thread but the calling one."""
     try:
         return len(os.listdir("/proc/self/task")) == 1
     except OSError:  # a system that does not show the threads of libraries
@@ -102,8 +102,8 @@ def has_one_thread() -> bool:
 
 
 def call_solver(function: Any, arguments: Mapping[str, Array]) -> Answer:
-    """Call a solver of CasADi. Returns the variables, and what it says of its success."""
-    with quiet():
+    """Call a solver of CasADi. Returns the variables, and its report of success."""
+    with without_output():
         result = function(**arguments)
     stats = function.stats()
     found = {key: stats.get(key) for key in ("success", "iter_count", "unified_return_status")}
@@ -113,8 +113,8 @@ def call_solver(function: Any, arguments: Mapping[str, Array]) -> Answer:
 def call_bounded(
     function: Any, arguments: Mapping[str, Array], limit: int
 ) -> tuple[bool, Answer | None]:
-    """As ``call_solver``, in a fresh copy of a process, given up after ``limit`` seconds of
-    processor time: whether it came to its end, and the answer.
+    """Call ``call_solver`` in a fresh copy of a process, given up after ``limit`` seconds of processor time. Returns
+    whether it came to its end, and the answer.
 
     Raises:
         RuntimeError: the solver raised; the text is its error's.
@@ -125,8 +125,8 @@ def call_bounded(
 
 
 @contextlib.contextmanager
-def quiet() -> Iterator[None]:
-    """The solvers write to the process's standard output, whatever they are told; not now."""
+def without_output() -> Iterator[None]:
+    """Silence the solvers, which write to the process's standard output whatever their options."""
     kept = os.dup(1)
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
@@ -149,7 +149,7 @@ class _Helper:
     def call(
         self, function: Any, arguments: Mapping[str, Array], limit: int
     ) -> tuple[bool, Answer | None]:
-        """See ``call_bounded``."""
+        """Call a solver; see ``call_bounded``."""
         with self._lock:
             try:
                 ended, error, answer, used = self._ask(function, arguments, limit)
@@ -203,7 +203,7 @@ _helper = _Helper()
 
 
 def serve() -> None:
-    """What the process does: answers calls until its input ends."""
+    """Answer calls until the process's input ends."""
     import casadi as ca
 
     requests: IO[bytes] = os.fdopen(os.dup(0), "rb")

@@ -66,7 +66,9 @@ def in_turn(
 
 
 def wrong_times(lifted: Mapping[str, float], whole: float | None, phase: str) -> str:
-    """What is wrong with the times [s] of feet that leave or land in turn in a phase of that time; empty: nothing."""
+    """Return what is wrong with the times [s] of feet that leave or land in turn in a phase of that time; empty:
+    nothing.
+    """
     if not lifted:
         return "name contact points and a time, such as {fore: 80 ms}"
     most = MOST_IN_TURN if whole is None else min(MOST_IN_TURN, whole - LEAST_TOGETHER)
@@ -79,7 +81,7 @@ def wrong_times(lifted: Mapping[str, float], whole: float | None, phase: str) ->
 def wrong_groups(
     robot: RobotDescription, groups: Sequence[tuple[str, str | Iterable[str]]]
 ) -> Iterator[tuple[str, str]]:
-    """By its place in the task each word that means no contact point, and what it could be."""
+    """Yield by its place in the task each word that means no contact point, and what it could be."""
     for where, words in groups:
         for word in (words,) if isinstance(words, str) else words:
             if not contact_points(robot, word):

@@ -35,7 +35,7 @@ class PlanError(AloftError):
 
 
 def need_planner() -> None:
-    """Raises ``MissingExtraError`` where CasADi is not installed, without which no plan is made."""
+    """Raise ``MissingExtraError`` where CasADi is not installed, without which no plan is made."""
     need_extra("casadi", "plan", "planning a jump")
 
 
@@ -43,16 +43,17 @@ Key = str | int
 
 
 @dataclass(frozen=True)
-class PlacedFile:
-    """What is in a file: ``values`` as plain data, and where each of them is."""
+class LocatedFile:
+    """Content of a file: ``values`` as plain data, and the place of each of them."""
 
     file: str
     values: dict[str, Any]
     tree: MapNode
 
     def place(self, keys: Sequence[Key], *, key: bool = False) -> str:
-        """``file:line:column`` of the value at that path, or of its ``key``; of what comes nearest
-        where there is none."""
+        """Return ``file:line:column`` of the value at that path, or of its ``key``; of what comes nearest where there
+        is none.
+        """
         node: Node = self.tree
         where = node.where
         for step in keys:
@@ -63,18 +64,19 @@ class PlacedFile:
                 where = node.where
         return str(where)
 
-    def place_of_words(self, text: str) -> str:
-        """Where the last of the file's keys is that a message speaks of; the start of the file
-        where it speaks of none."""
-        describe_task = [
+    def location_of_words(self, text: str) -> str:
+        """Return the place of the last of the file's keys that a message names; the start of the file where it names
+        none.
+        """
+        named_keys = [
             entry.key_where
             for entry in self.tree
             if re.search(rf"\b{re.escape(entry.key)}\b", text)
         ]
-        return str(max(describe_task, default=self.tree.where))
+        return str(max(named_keys, default=self.tree.where))
 
 
-def read_placed(path: Path, example: str) -> PlacedFile:
+def read_located(path: Path, example: str) -> LocatedFile:
     """Read a file that is a mapping.
 
     Raises:
@@ -99,11 +101,11 @@ def read_placed(path: Path, example: str) -> PlacedFile:
         found = "nothing" if tree is None else repr(plain(tree))
         where = tree.where if tree else Position(shown, 1, 1)
         raise JumpTaskError(f"{where}: expected keys such as {example!r}, found {found}")
-    return PlacedFile(shown, plain(tree), tree)
+    return LocatedFile(shown, plain(tree), tree)
 
 
 ABANDONED = 3600.0
-"""After that many seconds nobody is still writing a part [s]."""
+"""Age from which a partial file counts as abandoned by its writer [s]."""
 
 
 def write_whole(path: Path, data: bytes) -> Path:

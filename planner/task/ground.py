@@ -22,17 +22,17 @@ from .sequence import (
 from .task import JumpTask
 
 GAP_DEPTH = 0.1
-"""How far the bottom of a gap is below the lowest ground [m]."""
+"""Depth of a gap's bottom below the lowest ground [m]."""
 ROOM = 1.5
-"""How far a step or a platform reaches beyond its edge [m]."""
+"""Length of a step or a platform beyond its edge [m]."""
 WIDTH = 0.75
-"""How far it reaches to either side of the robot's places [m]."""
+"""Reach of it to either side of the robot's places [m]."""
 
 FOOTING = 0.02
-"""How far beyond its planned contact points a foot may land where the ground leans [m]."""
+"""Distance beyond its planned contact points at which a foot may land where the ground leans [m]."""
 
-Stretch = tuple[float, float, StanceLocation]
-"""From, to [m, along the axis], and where the ground between them is the one stood on, going on."""
+GroundRange = tuple[float, float, StanceLocation]
+"""Stretch of ground: from, to [m, along the axis], and the place whose ground, going on, lies between them."""
 
 
 @dataclass(frozen=True)
@@ -40,37 +40,37 @@ class _Edges:
     """The ground along one axis of the world: ``axis`` 0 is ahead, 1 to the left."""
 
     axis: int
-    stretches: tuple[Stretch, ...]
+    ranges: tuple[GroundRange, ...]
 
     def with_edge(self, at: float, forward: bool, place: StanceLocation) -> _Edges:
         """Return the ground whose whole part beyond an edge is that of another place."""
         low, high = (at, math.inf) if forward else (-math.inf, at)
         kept = [(a, min(b, at), z) if forward else (max(a, at), b, z)
-                for a, b, z in self.stretches if (a < at if forward else b > at)]  # fmt: skip
+                for a, b, z in self.ranges if (a < at if forward else b > at)]  # fmt: skip
         return _Edges(self.axis, _sorted([*kept, (low, high, place)]))
 
     def with_gap(self, low: float, high: float, height: float) -> _Edges:
         """Return the ground with another height between two places."""
-        kept = [(max(a, c), min(b, d), z) for a, b, z in self.stretches
+        kept = [(max(a, c), min(b, d), z) for a, b, z in self.ranges
                 for c, d in ((-math.inf, low), (high, math.inf))]  # fmt: skip
-        found = [stretch for stretch in kept if stretch[0] < stretch[1]]
+        found = [ground_range for ground_range in kept if ground_range[0] < ground_range[1]]
         bottom = StanceLocation(0.0, 0.0, height, 0.0, 0.0)
         return _Edges(self.axis, _sorted([*found, (low, high, bottom)]))
 
     def height(self, x: float, y: float) -> float:
         """Return the height of the ground there [m]."""
         at = (x, y)[self.axis]
-        place = next(place for low, high, place in self.stretches if low <= at <= high)
+        place = next(place for low, high, place in self.ranges if low <= at <= high)
         return float(place.height(x, y))
 
 
 def _everywhere(place: StanceLocation, axis: int = 0) -> _Edges:
-    """Ground without edges: that of a place, going on."""
+    """Return ground without edges: that of a place, going on."""
     return _Edges(axis, ((-math.inf, math.inf, place),))
 
 
-def _sorted(stretches: list[Stretch]) -> tuple[Stretch, ...]:
-    return tuple(sorted(stretches, key=lambda stretch: stretch[:2]))
+def _sorted(ranges: list[GroundRange]) -> tuple[GroundRange, ...]:
+    return tuple(sorted(ranges, key=lambda ground_range: ground_range[:2]))
 
 
 def scene_of(task: JumpTask, robot: RobotDescription) -> Any:
@@ -139,8 +139,9 @@ def _stairs(task: JumpTask, robot: RobotDescription) -> dict[str, Any]:
 
 
 def _edge(task: JumpTask, hop: Hop, start: StanceLocation) -> tuple[int, float, bool]:
-    """Where the ground changes under a jump: the axis, the place along it, and whether the robot
-    goes towards its positive end."""
+    """Return the edge of the ground under a jump: the axis, the place along it, and whether the robot goes towards its
+    positive end.
+    """
     at = edge_of(hop, start)
     ahead = hop.distance_x or 0.0
     if at is None and hop.gap and not changes_ground(hop, start) and abs(ahead) > hop.gap:
@@ -181,7 +182,7 @@ def _require_ground(task: JumpTask, robot: RobotDescription, ground: _Edges) -> 
 
 
 def _soles(robot: RobotDescription, place: StanceLocation) -> list[tuple[float, float]]:
-    """Where the contact points are on the ground, as the robot stands at a place."""
+    """Return the places of the contact points on the ground, as the robot stands at a place."""
     points = standing_contacts(robot)[:, :2]
     cosine, sine = math.cos(place.heading), math.sin(place.heading)
     return [
@@ -192,7 +193,7 @@ def _soles(robot: RobotDescription, place: StanceLocation) -> list[tuple[float, 
 
 def _scene(ground: _Edges, places: tuple[StanceLocation, ...]) -> dict[str, Any]:
     """Return the ground as data: what is higher than the lowest part is a box on the floor."""
-    floor = min(_round(place.z) for _, _, place in ground.stretches)
+    floor = min(_round(place.z) for _, _, place in ground.ranges)
     boxes = [
         {"x": x, "y": y, "top": _round(place.z), "bottom": floor}
         for x, y, place in _extents(ground, places)
@@ -222,11 +223,11 @@ def _leaning_scene(
 def _extents(
     ground: _Edges, places: tuple[StanceLocation, ...]
 ) -> Iterator[tuple[list[float], list[float], StanceLocation]]:
-    """From where to where each stretch reaches along x and along y [m]."""
+    """Yield the extents of each of the ranges along x and along y [m]."""
     along = [(p.x, p.y)[ground.axis] for p in places]
     aside = [(p.y, p.x)[ground.axis] for p in places]
     side = [_round(min(aside) - WIDTH), _round(max(aside) + WIDTH)]
-    for low, high, place in ground.stretches:
+    for low, high, place in ground.ranges:
         if high <= low:
             continue
         reach = [
@@ -237,5 +238,5 @@ def _extents(
 
 
 def _round(value: float) -> float:
-    """To a micrometre, so that it reads well."""
+    """Round to a micrometre, so that it reads well."""
     return round(value, 6) + 0.0

@@ -11,7 +11,7 @@ from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
 
 LIMIT_MARGIN = 0.005
-"""rad; between two knots a joint at its limit would pass it by about as much."""
+"""Margin of a joint's limit [rad]; between two knots a joint at its limit would pass it by about as much."""
 
 
 class Margins(Parameters):

@@ -96,7 +96,7 @@ class PlannedJump:
 
     @property
     def duration(self) -> float:
-        """From the first knot to the last [s]."""
+        """Time from the first knot to the last [s]."""
         return float(self.time[-1] - self.time[0])
 
     @property
@@ -106,22 +106,22 @@ class PlannedJump:
 
     @property
     def lift_off_times(self) -> tuple[float, ...]:
-        """When the flights begin [s]."""
+        """Starts of the flights [s]."""
         return tuple(start for start, _ in self.flights)
 
     @property
     def touchdown_times(self) -> tuple[float, ...]:
-        """When they end [s]."""
+        """Ends of the flights [s]."""
         return tuple(end for _, end in self.flights)
 
     @property
     def flight_time(self) -> float:
-        """From lift-off to touchdown of the first flight [s]."""
+        """Time from lift-off to touchdown of the first flight [s]."""
         return self.touchdown_time - self.lift_off_time
 
     @property
     def valid(self) -> bool:
-        """Whether the plan was checked and every test passed."""
+        """True if the plan was checked and every test passed."""
         return bool(self.report.get("valid", False))
 
     def knot_at(self, time: float) -> int:
@@ -187,7 +187,7 @@ def motor_load(time: Array, joint_torque: Array, robot: RobotDescription) -> dic
 
 
 def _plain(value: Any) -> Any:
-    """NumPy's numbers and arrays as JSON has them."""
+    """Return NumPy's numbers and arrays as JSON has them."""
     if hasattr(value, "tolist"):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} cannot be kept in a plan file")
@@ -205,7 +205,7 @@ def write_plan(
 
 
 def task_of_header(header: Mapping[str, Any], where: str = "task") -> JumpTask:
-    """The task of a plan's file, which says all of it: in files from before there were recipes too.
+    """Return the task of a plan's file, which holds all of it: in files from before there were recipes too.
 
     Raises:
         KeyError, TypeError, JumpTaskError: the header has no such task.

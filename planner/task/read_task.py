@@ -25,7 +25,7 @@ from ...robots.kinematics import (
 )
 from ...robots.shapes import corners_of
 from .contact_groups import contact_points, wrong_groups
-from .files import JumpTaskError, read_placed
+from .files import JumpTaskError, read_located
 from .margins import unknown_joints
 from .sequence import Hop, StanceLocation, edge_of
 from .task import JumpTask, make_task
@@ -39,7 +39,7 @@ def read_task(path: str | Path) -> JumpTask:
             itself or the robot; one line for each, with ``file:line:column``.
     """
     path = Path(path)
-    source = read_placed(path, "rise: 15 cm")
+    source = read_located(path, "rise: 15 cm")
     task = make_task({"name": path.stem, **source.values}, where=str(path), source=source)
     try:
         robot = find_robot(task.robot, path.parent)
@@ -66,7 +66,7 @@ def changed_task(path: Path, changes: Mapping[str, Any]) -> JumpTask:
             other; lines about a change begin with ``task: key:``.
     """
     read_task(path)  # what is wrong in the file itself is said with its line
-    values = dict(read_placed(path, "rise: 15 cm").values)
+    values = dict(read_located(path, "rise: 15 cm").values)
     for name in INSTEAD:
         if any(changes.get(other) is not None for other in INSTEAD if other != name):
             values.pop(name, None)
@@ -94,7 +94,7 @@ def spoken_name(task: JumpTask) -> JumpTask:
 
 
 def describe_task(task: JumpTask) -> str:
-    """What a task asks for, in a few words."""
+    """Return a summary of a task in a few words."""
     if task.jumps or task.repeat:
         return f"{len(task.hops())} jumps"
     told = []
@@ -126,14 +126,14 @@ def _cm(length: float) -> str:
 
 
 LENIENCE = 0.03
-"""What the centre of mass may move within the body [m], beyond what the legs' length allows."""
+"""Travel of the centre of mass within the body [m], beyond what the legs' length allows."""
 
 Contradiction = tuple[str, str]
 """The parameter to look at first, and what is wrong."""
 
 
 def contradictions(task: JumpTask, robot: RobotDescription) -> list[Contradiction]:
-    """Everything about the task that cannot be, in the order of its parameters."""
+    """Return all contradictions of the task, in the order of its parameters."""
     return [
         *_unknown_names(task, robot),
         *_contact_phases(task, robot),
@@ -182,15 +182,17 @@ def _unknown_names(task: JumpTask, robot: RobotDescription) -> Iterator[Contradi
 
 
 def _contact_phases(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
-    """Contact points that feet leave and land on in turn, or that phases name, are the robot's; some always push."""
+    """Yield contact points that feet leave and land on in turn, or that phases name, and the robot does not have; and
+    phases in which none pushes.
+    """
     groups = [
         (f"{key}.{name}", name)
         for key in ("take_off", "touchdown")
         for name in getattr(task, key) or ()
     ]
-    for number, span in enumerate(task.phases or ()):
-        groups.append((f"phases.{number}.contacts", span.contacts))
-        groups.append((f"phases.{number}.raised", span.raised or ()))
+    for number, phase_spec in enumerate(task.phases or ()):
+        groups.append((f"phases.{number}.contacts", phase_spec.contacts))
+        groups.append((f"phases.{number}.raised", phase_spec.raised or ()))
     wrong = list(wrong_groups(robot, groups)) if robot.contacts else []
     yield from wrong
     for key in ("take_off", "touchdown"):
@@ -216,8 +218,9 @@ def _jumps(task: JumpTask) -> Iterator[tuple[str, Hop, StanceLocation, StanceLoc
 
 
 def _flight(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
-    """Height and time of a flight follow from one another, but for where the legs let the centre
-    of mass be at lift-off and touchdown."""
+    """Yield contradictions between height and time of a flight, which follow from one another, but for where the legs
+    let the centre of mass be at lift-off and touchdown.
+    """
     low, high = leg_travel(robot)
     for path, hop, _, _ in _jumps(task):
         asked, up = hop.flight_time, hop.landing_height or 0.0
@@ -243,7 +246,7 @@ def _flight(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
 
 
 def _fall(height: float) -> float:
-    """How long a fall takes [s]; none from below the ground."""
+    """Return the duration of a fall [s]; none from below the ground."""
     return math.sqrt(2.0 * max(0.0, height) / GRAVITY)
 
 
@@ -258,7 +261,7 @@ def leg_travel(robot: RobotDescription) -> tuple[float, float]:
 
 
 def _slopes(task: JumpTask) -> Iterator[Contradiction]:
-    """Feet hold on all ground that they stand on."""
+    """Yield the ground that the robot stands on and on which its feet do not hold."""
     where = [("slope", task.places()[0])]
     where += [(f"{path}landing_slope", end) for path, _, _, end in _jumps(task)]
     for key, place in where:
@@ -272,7 +275,7 @@ def _slopes(task: JumpTask) -> Iterator[Contradiction]:
 
 
 def _edge(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
-    """Yield a step's edge is under no foot, and nothing of the standing robot is in the step."""
+    """Yield the faults of a step: its edge is under a foot, or part of the standing robot is in the step."""
     for path, hop, start, end in _jumps(task):
         edge = edge_of(hop, start)
         if edge is None or not robot.contacts:
@@ -296,9 +299,11 @@ def edge_room(
     end: StanceLocation,
     above: float = 0.0,
 ) -> tuple[float, float]:
-    """Between which x [m] an edge under a jump is under no foot, and nothing of the standing robot in the step, or less
-    than ``above`` [m] over it: from the front of the robot where it begins to its back where it lands, the former first.
-    A robot that lands near where it stood has no such room: the former is then beyond the latter."""
+    """Return the range of x [m] in which an edge under a jump is under no foot, and nothing of the standing robot in
+    the step, or less than ``above`` [m] over it: from the front of the robot where it begins to its back where it
+    lands, the former first. A robot that lands near where it stood has no such room: the former is then beyond the
+    latter.
+    """
     before, behind = (
         list(_reaches(robot, place, higher + above if higher > 0.0 else higher))
         for _, place, higher in _stances(hop, start, end)
@@ -311,7 +316,7 @@ def edge_room(
 def _stances(
     hop: Hop, start: StanceLocation, end: StanceLocation
 ) -> tuple[tuple[str, StanceLocation, float], ...]:
-    """Where the robot stands before and behind an edge, and how much higher the ground beyond it is [m]."""
+    """Return the places of the robot before and behind an edge, and how much higher the ground beyond it is [m]."""
     step = hop.landing_height or 0.0
     return ("start", start, step), ("landing", end, -step)
 
@@ -319,8 +324,9 @@ def _stances(
 def _reaches(
     robot: RobotDescription, place: StanceLocation, higher: float
 ) -> Iterator[tuple[str, float, float]]:
-    """From which x to which x [m] the feet of a robot that stands there reach, and what of it is lower than ground
-    beside it that is ``higher`` [m]: it must be away from that with all that is below its height."""
+    """Yield the range of x [m] that the feet of a robot that stands there reach, and what of it is lower than ground
+    beside it that is ``higher`` [m]: it must be away from that with all that is below its height.
+    """
     feet = standing_contacts(robot)
     for name, points, radii in (
         ("the feet", feet, np.zeros(len(feet))), *_low_links(robot, higher)
@@ -334,8 +340,9 @@ def _onward(heading: float) -> Array:
 
 
 def _low_links(robot: RobotDescription, height: float) -> Iterator[tuple[str, Array, Array]]:
-    """Links of the standing robot of which a part is lower than that [m] above the ground: the name, the places
-    (n, 3) of the ends of the shapes that are, from the feet's middle, and their radii (n,)."""
+    """Yield the links of the standing robot of which a part is lower than that [m] above the ground: the name, the
+    places (n, 3) of the ends of the shapes that are, from the feet's middle, and their radii (n,).
+    """
     if height <= 0.0:
         return
     poses = link_poses_in_base(robot, robot.standing_position)

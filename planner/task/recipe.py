@@ -48,7 +48,7 @@ from .sequence import Hop, PhaseSpec
 
 EFFORT, MOST_EFFORT = 0.85, 0.92
 EASY, HARD = 1.0, 1.5
-"""Demands (see ``demand``) up to which the least, and from which the most effort is chosen."""
+"""Demands (see ``take_off_energy_ratio``) up to which the least, and from which the most effort is chosen."""
 WEIGHTS = {"force": 0.01, "orientation": 20.0, "impulse": 5.0}
 SCALED_WEIGHTS = ("force", "impulse")
 THRUST, TOES, TOE_KNOTS = 0.25, 0.04, 8
@@ -65,12 +65,14 @@ LEAST_CLEARANCE = 0.04
 """m. Over a step that is lower than the feet's share they need to rise by its own height only, or by this: 8 cm over a
 step of 3 cm made G1 leave the ground on bent knees, after a squat in which its base was 0.21 m above the ground."""
 KNEE_SAG = 0.06
-"""Of knees that fold down to the ground, as a share of the centre of mass's height. In a deep squat joints are
-50 mrad off. With 4 % the thighs of Solo12 touched, as long as its mesh is."""
+"""Sag of knees that fold down to the ground, as a share of the centre of mass's height. In a deep squat joints are 50
+mrad off. With 4 % the thighs of Solo12 touched, as long as its mesh is.
+"""
 TOE_PUSH = 2.5
-"""Times the weight that the ankles must be able to bear on the toes, or no heel rises before them. G1's bear 1.8. At its
-margin it could push with 1.4 in the last sixth of the thrust, so it had to be fast before: it first stood up on straight
-knees and swung its torso by 50 degrees, and fell."""
+"""Multiple of the weight that the ankles must be able to bear on the toes, or no heel rises before them. G1's bear 1.8.
+At its margin it could push with 1.4 in the last sixth of the thrust, so it had to be fast before: it first stood up on
+straight knees and swung its torso by 50 degrees, and fell.
+"""
 LOAD, DEEP_LOAD = 0.4, 0.6
 """The share of the weight that the ground bears until lift-off; and before a deep squat."""
 SQUAT, DEEP_SQUAT = 0.4, 0.5
@@ -79,31 +81,39 @@ DEEP, DEEP_BACK = (0.65, 0.75), (0.8, 0.9)
 """Rises in place, and distances backwards, as multiples of the centre of mass's height: above the first
 number the squat begins to be a deep one, and from the second on it wholly is."""
 LOW, FLOWN = 0.1, 0.75
-"""Up to which rise, as a multiple of the centre of mass's height, a robot with toes is asked to fly a share of the
-rise, and that share. Without it such a jump is hardly more than standing up onto the toes, and the toes, which
-leave the ground some milliseconds late, take away more of its speed than the plan has to spare."""
+"""Greatest rise, as a multiple of the centre of mass's height, for which a robot with toes must fly a share of the
+rise, and that share. Without it such a jump is hardly more than standing up onto the toes, and the toes, which leave
+the ground some milliseconds late, take away more of its speed than the plan has to spare.
+"""
 TOUCHDOWN_SPEED, TOUCHDOWN_SLIDE, TOUCHDOWN_ROLL = 1.7, 0.6, 1.2
-"""m/s of the feet at touchdown, downwards and along the ground, of soles and of balls, which roll on, for a robot of
-BRUCE's size."""
+"""Speeds of the feet at touchdown [m/s], downwards and along the ground, of soles and of balls, which roll on, for a
+robot of BRUCE's size.
+"""
 FALL, LEVEL_FALL = 0.9, 1.1
-"""Up to which fall from the apex, as a multiple of the centre of mass's height, slow feet are asked for:
-in general, and in a jump on level ground that ends where it began. From higher up the motors stop the
-robot only if its legs are nearly stretched, and then flat feet are fast."""
+"""Greatest fall from the apex, as a multiple of the centre of mass's height, for which slow feet are required: in
+general, and in a jump on level ground that ends where it began. From higher up the motors stop the robot only if its
+legs are nearly stretched, and then flat feet are fast.
+"""
 TOES_LAND, TOE_LANDING_KNOTS = 0.04, 6
 """s; for how long before the heels the toes touch down in a jump straight ahead from higher up."""
 TOES_SPEEDS = ((1.37, 1.8), (1.46, 2.3))
-"""Up to which fall, again as a multiple of that height, the toes can be as slow as that [m/s], for a
-robot of BRUCE's size. From higher up nothing is asked for."""
+"""Greatest fall, again as a multiple of that height, from which the toes can be as slow as that [m/s], for a robot of
+BRUCE's size. From higher up there is no limit.
+"""
 DROP = 0.5
-"""How far down such a jump goes at least, again as a multiple of that height."""
+"""Least depth of such a jump, again as a multiple of that height."""
 LANDING_EFFORT = 1.0
-"""From touchdown on, where the toes land first: balance takes over there, and the plan is not followed."""
+"""Share of the motors' abilities from touchdown on, where the toes land first: balance takes over there, and the plan
+is not followed.
+"""
 SQUAT_LEAN, FAR = 0.9, 1.2
-"""rad, and from which distance ahead on, as a multiple of the centre of mass's height."""
+"""Lean in the squat [rad], and the distance ahead from which on it holds, as a multiple of the centre of mass's
+height.
+"""
 HIGH_AND_FAR = (0.42, 0.6)
 """Rise and distance ahead, as multiples of that height, beyond both of which the same holds."""
 STEP_LEAN = 0.85
-"""rad, in front of a step, whatever its distance."""
+"""Lean in the squat in front of a step, whatever its distance [rad]."""
 
 
 class RecipeInputs(Protocol):
@@ -122,7 +132,7 @@ class RecipeInputs(Protocol):
 
     @property
     def model_fields_set(self) -> set[str]:
-        """The names of what the task says."""
+        """Names of the fields that the task sets."""
         ...
 
     def hops(self) -> tuple[Hop, ...]:
@@ -149,14 +159,15 @@ class Choice:
 
 
 def applies(task: RecipeInputs) -> bool:
-    """Whether the recipe chooses anything for a task: for jumps of the ``full`` formulation in
-    which nothing turns over."""
+    """Check whether the recipe chooses anything for a task: for jumps of the ``full`` formulation in which nothing
+    turns over.
+    """
     turns = any(hop.rotation for hop in task.hops())
     return task.recipe == "robust" and task.formulation == "full" and not turns
 
 
 def choices(task: RecipeInputs, robot: RobotDescription) -> tuple[Choice, ...]:
-    """Everything that the recipe chooses for a task of a robot; empty if the task sets all parameters."""
+    """Return all choices of the recipe for a task of a robot; empty if the task sets all parameters."""
     if not applies(task) or not robot.contacts:
         return ()
     return (*_plain(task, robot), *_weights(task, robot), *_margins(task, robot))
@@ -176,45 +187,49 @@ def chosen_fields(task: RecipeInputs, found: tuple[Choice, ...]) -> dict[str, An
 
 
 def _plain(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
-    """Impact, effort and phases."""
-    said, slow = task.model_fields_set, size_of(robot).slow
-    if "impact" not in said:
+    """Yield the choices of impact, effort and phases."""
+    given_fields, slow = task.model_fields_set, size_of(robot).slow
+    if "impact" not in given_fields:
         yield Choice("impact", True, "feet that stop before they touch cost joint speed")
-    if "effort" not in said:
-        asked = demand(task, robot)
+    if "effort" not in given_fields:
+        asked = take_off_energy_ratio(task, robot)
         share = min(1.0, max(0.0, (asked - EASY) / (HARD - EASY)))
         why = f"the jump asks for {asked:.2g} (easy below {EASY:g}, hard from {HARD:g}); "
         yield Choice("effort", round(EFFORT + share * (MOST_EFFORT - EFFORT), 2),
                      why + "the rest is the feedback's")  # fmt: skip
     heights = [max(0.0, hop.landing_height or 0.0) for hop in task.hops()]
-    if "foot_clearance" not in said and any(heights):
+    if "foot_clearance" not in given_fields and any(heights):
         high = FOOT_CLEARANCE * size_of(robot).height
         if len(heights) == 1:
             high = min(high, max(LEAST_CLEARANCE, heights[0]))
         yield Choice("foot_clearance", rounded(high), "feet pass a step's edge")
-    if "knots" not in said:
+    if "knots" not in given_fields:
         why = "the flight is exact on any grid; where feet stand knots are closer"
         yield Choice("knots", task.knots.model_copy(update=KNOTS), why)
     rows = len(task.hops()) > 1
-    if "phases" in said:
+    if "phases" in given_fields:
         return
     contact = _contact_time(task, slow)
-    if rows and "contact_time" not in said:
+    if rows and "contact_time" not in given_fields:
         yield Choice("contact_time", contact, "between two jumps the robot comes to balance")
     if task.take_off or task.touchdown:
         return
     toes = _toes(robot)
     if toes and task.thrust_time is not None and not (rows and contact is None):
-        whole = task.thrust_time if "thrust_time" in said else rounded(THRUST * slow)
+        whole = task.thrust_time if "thrust_time" in given_fields else rounded(THRUST * slow)
         late = min(rounded(TOES * slow), 0.5 * whole)
         half = 0.5 * (contact or 0.0)
-        spans = [
+        phase_specs = [
             PhaseSpec(phase="squat", time=_squat_time(task, robot)),
             *_thrust(whole, late, toes),
         ]
         for _ in task.hops()[1:]:
             between = _thrust(half, min(late, 0.5 * half), toes)
-            spans += [PhaseSpec(phase="flight"), PhaseSpec(phase="landing", time=half), *between]
+            phase_specs += [
+                PhaseSpec(phase="flight"),
+                PhaseSpec(phase="landing", time=half),
+                *between,
+            ]
         landing: tuple[PhaseSpec, ...] = (
             PhaseSpec(phase="landing", time=_time(task, "landing_time", slow)),
         )
@@ -223,11 +238,11 @@ def _plain(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
         if toes_speed(task, robot) is not None and (landing[0].time or 1.0) > 2.0 * soft:
             landing = _landing(landing[0].time, soft, toes)
             why += f"; they come down {1000 * soft:.0f} ms after them, because flat feet would be too fast"
-        yield Choice("phases", (*spans, PhaseSpec(phase="flight"), *landing), why)
+        yield Choice("phases", (*phase_specs, PhaseSpec(phase="flight"), *landing), why)
 
 
 def _toes(robot: RobotDescription) -> str:
-    """What the names of the toes of a robot have in common that can thrust with them; empty for others."""
+    """Return the common word in the names of a robot's toes that can thrust with them; empty for others."""
     token = toe_name_token(robot)
     return token if token and toe_push(robot) >= TOE_PUSH else ""
 
@@ -250,27 +265,27 @@ def _landing(whole: float | None, early: float, toes: str) -> tuple[PhaseSpec, .
 
 
 def _contact_time(task: RecipeInputs, slow: float) -> float | None:
-    """The time on the ground between two jumps [s]: what the task says, or what gives room for balance."""
-    said = "contact_time" in task.model_fields_set
-    return task.contact_time if said else rounded(CONTACT * slow)
+    """Return the time on the ground between two jumps [s]: the task's, or one that leaves time for balance."""
+    given = "contact_time" in task.model_fields_set
+    return task.contact_time if given else rounded(CONTACT * slow)
 
 
 def _time(task: RecipeInputs, name: str, slow: float) -> float | None:
-    """A phase's time [s]: what the task says, or its usual one for a robot of that size."""
+    """Return a phase's time [s]: the task's, or the usual one for a robot of that size."""
     value: float | None = getattr(task, name)
     return value if name in task.model_fields_set or value is None else rounded(value * slow)
 
 
 def _squat_time(task: RecipeInputs, robot: RobotDescription) -> float | None:
-    """The squat's time [s]: what the task says, or the longer, the deeper it is."""
+    """Return the squat's time [s]: the task's, or the longer, the deeper it is."""
     if "squat_time" in task.model_fields_set or task.squat_time is None:
         return task.squat_time
-    time = SQUAT + deep(task, robot) * (DEEP_SQUAT - SQUAT)
+    time = SQUAT + squat_depth_share(task, robot) * (DEEP_SQUAT - SQUAT)
     return rounded(round(time, 2) * size_of(robot).slow)
 
 
 def _weights(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
-    said = task.weights.model_fields_set if "weights" in task.model_fields_set else set()
+    given_fields = task.weights.model_fields_set if "weights" in task.model_fields_set else set()
     light = size_of(robot).light
     reasons = {
         "force": "forces are dear: a shallow squat and a smooth thrust",
@@ -278,7 +293,7 @@ def _weights(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
         "impulse": "the legs give way as the feet touch down",
     }
     for name, value in WEIGHTS.items():
-        if name not in said:
+        if name not in given_fields:
             scaled = rounded(value * light) if name in SCALED_WEIGHTS else value
             yield Choice(f"weights.{name}", scaled, reasons[name])
 
@@ -286,7 +301,7 @@ def _weights(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
 def _margins(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
     if "margins" in task.model_fields_set and task.margins is None:
         return
-    said = set() if task.margins is None else task.margins.model_fields_set
+    given_fields = set() if task.margins is None else task.margins.model_fields_set
     hops = task.hops()
     # Only for a single jump: in a row nothing squats that deep in front of a step.
     onto = max(0.0, hops[0].landing_height or 0.0) if len(hops) == 1 else 0.0
@@ -294,33 +309,33 @@ def _margins(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
     high, ahead = (limit * size_of(robot).height for limit in HIGH_AND_FAR)
     both = any((hop.rise or 0.0) > high and (hop.distance_x or 0.0) > ahead for hop in hops)
     lies_down = far > FAR or (both and not onto)
-    if "squat_lean" not in said and lies_down:
+    if "squat_lean" not in given_fields and lies_down:
         why = f"{far:.2g} times the centre of mass's height ahead; without it the torso lies down"
         yield Choice("margins.squat_lean", SQUAT_LEAN, why)
-    elif "squat_lean" not in said and onto:
+    elif "squat_lean" not in given_fields and onto:
         why = "the torso lies down in front of a step, as the calves keep away from it"
         yield Choice("margins.squat_lean", STEP_LEAN, why)
-    if "load" not in said:
-        share = round(LOAD + deep(task, robot) * (DEEP_LOAD - LOAD), 2)
+    if "load" not in given_fields:
+        share = round(LOAD + squat_depth_share(task, robot) * (DEEP_LOAD - LOAD), 2)
         yield Choice(
             "margins.load", share, "it does not squat so fast that its feet lose the ground"
         )
     rise = min(_rise(hop) for hop in hops)
     low = 0.0 < rise < LOW * size_of(robot).height and _toes(robot)
-    if "lift_off_speed" not in said and low and all(hop.rise for hop in hops):
+    if "lift_off_speed" not in given_fields and low and all(hop.rise for hop in hops):
         speed = rounded(math.sqrt(2.0 * GRAVITY * FLOWN * rise))
         yield Choice(
             "margins.lift_off_speed", speed, "it flies, and does not only stand up onto its toes"
         )
-    if "landing_lean" not in said:
+    if "landing_lean" not in given_fields:
         yield Choice("margins.landing_lean", LANDING_LEAN, "it lands upright")
     knees = knee_limits(robot, KNEE_BEND)
-    if "landing_limits" not in said and knees:
+    if "landing_limits" not in given_fields and knees:
         yield Choice("margins.landing_limits", knees, "it lands on bent knees, which can give way")
-    yield from _slow_feet(task, robot, said)
+    yield from _slow_feet(task, robot, given_fields)
     fall = max(0.0, *(-(hop.landing_height or 0.0) for hop in hops))
     at_a_step = any(hop.landing_height for hop in hops)
-    if "step" not in said and (at_a_step or knee_sag(robot)):
+    if "step" not in given_fields and (at_a_step or knee_sag(robot)):
         edge = STEP + STEP_HEIGHT * max(fall, onto) if at_a_step else 0.0
         why = (
             "a disturbed robot must not touch the step"
@@ -328,13 +343,15 @@ def _margins(task: RecipeInputs, robot: RobotDescription) -> Iterator[Choice]:
             else "knees hang lower than planned"
         )
         yield Choice("margins.step", rounded(edge + knee_sag(robot)), why)
-    if "joints" not in said:
+    if "joints" not in given_fields:
         room = math.floor(100.0 * min(JOINTS, 0.5 * least_distance_to_limits(robot))) / 100.0
         yield Choice("margins.joints", max(Margins().joints, room), "joints keep off their limits")
 
 
-def _slow_feet(task: RecipeInputs, robot: RobotDescription, said: set[str]) -> Iterator[Choice]:
-    """How slowly the feet come down, where the motors can stop the robot all the same."""
+def _slow_feet(
+    task: RecipeInputs, robot: RobotDescription, given_fields: set[str]
+) -> Iterator[Choice]:
+    """Yield slower touchdown speeds of the feet, where the motors can stop the robot all the same."""
     size = size_of(robot)
     hops = task.hops()
     level = not any(hop.landing_height or hop.distance_x or hop.distance_y for hop in hops)
@@ -343,24 +360,24 @@ def _slow_feet(task: RecipeInputs, robot: RobotDescription, said: set[str]) -> I
         speed = toes_speed(task, robot)
         if speed is None or "phases" in task.model_fields_set:
             return
-        if "touchdown_speed" not in said:
+        if "touchdown_speed" not in given_fields:
             yield Choice("margins.touchdown_speed", speed, "fast toes sink into soft ground")
-        if "landing_effort" not in said:
+        if "landing_effort" not in given_fields:
             yield Choice("margins.landing_effort", LANDING_EFFORT, "the legs must stop a deep fall")
         return
-    if "touchdown_speed" not in said:
+    if "touchdown_speed" not in given_fields:
         speed = rounded(TOUCHDOWN_SPEED * size.slow)
         yield Choice("margins.touchdown_speed", speed, "fast feet sink into soft ground")
     # Jumps back go 1 cm too far with that bound.
     back = any((hop.distance_x or 0.0) < 0.0 for hop in task.hops())
-    if "touchdown_slide" not in said and not back:
+    if "touchdown_slide" not in given_fields and not back:
         most = TOUCHDOWN_ROLL if ball_feet(robot) else TOUCHDOWN_SLIDE
         why = "feet that swing on miss their place if they land early"
         yield Choice("margins.touchdown_slide", rounded(most * size.slow), why)
 
 
 def toes_speed(task: RecipeInputs, robot: RobotDescription) -> float | None:
-    """How fast the toes may be [m/s] where they should touch down before the heels; ``None``: nowhere.
+    """Return the greatest speed of the toes [m/s] where they should touch down before the heels; ``None``: nowhere.
 
     They should in a single jump straight ahead and down from so high up that flat feet are fast, by a
     robot that has toes. Aside, or with a turn, no such plans are found.
@@ -376,12 +393,14 @@ def toes_speed(task: RecipeInputs, robot: RobotDescription) -> float | None:
 
 
 def knee_sag(robot: RobotDescription) -> float:
-    """By how much [m] knees may hang lower than planned, of legs that end in balls: they fold down to the ground."""
+    """Return the distance [m] that knees may hang lower than planned, of legs that end in balls: they fold down to the
+    ground.
+    """
     return KNEE_SAG * size_of(robot).height if ball_feet(robot) else 0.0
 
 
-def deep(task: RecipeInputs, robot: RobotDescription) -> float:
-    """How deep the squat must be, 0 to 1: for a high jump in place, or one far back.
+def squat_depth_share(task: RecipeInputs, robot: RobotDescription) -> float:
+    """Return the depth of the squat, 0 to 1: for a high jump in place, or one far back.
 
     Such a squat is a fall that the legs must stop, and on soft ground the feet lose the ground as
     they do. It takes longer then, and the ground bears more. Other jumps do worse so (turns, steps
@@ -399,16 +418,16 @@ def deep(task: RecipeInputs, robot: RobotDescription) -> float:
 
 
 def _share(value: float, between: tuple[float, float]) -> float:
-    """How far a value has come from the one to the other of two, from 0 to 1."""
+    """Return a value's share of the way from the one to the other of two, from 0 to 1."""
     low, high = between
     return min(1.0, max(0.0, (value - low) / (high - low)))
 
 
-def demand(task: RecipeInputs, robot: RobotDescription) -> float:
-    """How much a jump asks for: its kinetic energy at lift-off by m g times the height of the
-    centre of mass, half of it. Speed aside counts three times, as legs push aside with their hips
-    only; a turn as the speed of what is a fifth of that height away. 1.2 is 20 cm straight up for
-    BRUCE."""
+def take_off_energy_ratio(task: RecipeInputs, robot: RobotDescription) -> float:
+    """Return the take-off energy ratio of a jump: its kinetic energy at lift-off by m g times the height of the centre
+    of mass, half of it. Speed aside counts three times, as legs push aside with their hips only; a turn as the speed of
+    what is a fifth of that height away. 1.2 is 20 cm straight up for BRUCE.
+    """
     height = size_of(robot).height
     found = 0.0
     for hop in task.hops():
@@ -423,7 +442,7 @@ def demand(task: RecipeInputs, robot: RobotDescription) -> float:
 
 
 def _rise(hop: Hop) -> float:
-    """How high a jump goes above where it begins [m]."""
+    """Return the height of a jump above where it begins [m]."""
     if hop.rise is not None:
         return hop.rise
     if hop.take_off_speed is not None:

@@ -27,7 +27,7 @@ from ...robots.limb import chain_to
 from ...runtime.language.parameters import Parameters
 
 KEPT = 8
-"""For how many robots and arguments a function's results are kept."""
+"""Number of robots and arguments for which a function's results are kept."""
 
 _Parameters = ParamSpec("_Parameters")
 _Result = TypeVar("_Result")
@@ -75,12 +75,13 @@ LEAST_CHANGE = 0.02
 LEAST_LOAD = 1e-6
 """Motors that a load on the toes takes a smaller share of their torque of do not carry it."""
 PART_OF_STANDING = 0.8
-"""Where a robot stands on nearly straight legs, this share of how they are bent then is asked for."""
+"""Share of the standing robot's bend in the legs that is required where it stands on nearly straight ones."""
 
 
 def toe_name_token(robot: RobotDescription) -> str:
-    """What the names of the front contact points of all feet have in common and those of no other
-    points have, such as ``toe``; empty where feet are no soles, or have no such word."""
+    """Return the word that the names of the front contact points of all feet have in common and those of no other
+    points have, such as ``toe``; empty where feet are no soles, or have no such word.
+    """
     front, others = list[str](), list[str]()
     for foot in robot.feet:
         places = {c.name: c.position[0] for c in robot.contacts if c.foot == foot.name}
@@ -98,8 +99,9 @@ def toe_name_token(robot: RobotDescription) -> str:
 
 @per_robot
 def toe_push(robot: RobotDescription) -> float:
-    """How many times its weight a robot can bear on its toes: what the joints behind its knees can, each with all of
-    its motors' torque, as the robot stands. Infinite where no such joint carries the toes."""
+    """Return the multiple of its weight that a robot can bear on its toes: what the joints behind its knees can, each
+    with all of its motors' torque, as the robot stands. Infinite where no such joint carries the toes.
+    """
     toes = [c for c in robot.contacts if toe_name_token(robot) in c.name.split("_")]
     poses, torque = _standing_poses(robot), np.zeros(len(robot.joints))
     for foot in robot.feet:
@@ -121,8 +123,9 @@ def toe_push(robot: RobotDescription) -> float:
 
 @per_robot
 def knee_limits(robot: RobotDescription, bend: float) -> Mapping[str, tuple[float, float]]:
-    """Limits [rad] that keep every knee bent by that much, by the joint's name or by the part of it
-    that is the same for all of them; no more than most of what the standing robot bends them."""
+    """Return the limits [rad] that keep every knee bent by that much, by the joint's name or by the part of it that is
+    the same for all of them; no more than most of what the standing robot bends them.
+    """
     found: dict[str, tuple[float, float]] = {}
     for foot in robot.feet:
         knee = _knee(robot, foot.link, foot.sole)
@@ -179,7 +182,7 @@ def _lengths(
     robot: RobotDescription, link: str, sole: tuple[float, float, float],
     first: int, joint: int, angles: Array,
 ) -> Array:  # fmt: skip
-    """Distances [m] from a leg's first joint to a place of a link, with one joint at those angles."""
+    """Return the distances [m] from a leg's first joint to a place of a link, with one joint at those angles."""
     positions = np.tile(robot.standing_position, (len(angles), 1))
     positions[:, joint] = angles
     count = len(angles)
@@ -199,8 +202,9 @@ DIGITS = 2
 
 
 def standing_height(robot: RobotDescription) -> float:
-    """How high the centre of mass is above the lowest contact point as the robot stands [m], with
-    the base upright."""
+    """Return the height of the centre of mass above the lowest contact point as the robot stands [m], with the base
+    upright.
+    """
     poses = _standing_poses(robot)
 
     def height(link: str, place: Any) -> float:
@@ -213,7 +217,7 @@ def standing_height(robot: RobotDescription) -> float:
 
 
 def _standing_poses(robot: RobotDescription) -> LinkPoses:
-    """Of the robot as it stands, with the base upright at the origin."""
+    """Return the link poses of the robot as it stands, with the base upright at the origin."""
     angles = robot.standing_position.copy()
     for k, joint in enumerate(robot.joints):
         angles[k] = robot.held.get(joint.name, angles[k])
@@ -223,8 +227,9 @@ def _standing_poses(robot: RobotDescription) -> LinkPoses:
 
 @dataclass(frozen=True)
 class Size:
-    """How large a robot is: the height of its standing centre of mass [m], and by what times and
-    the weights of forces are multiplied."""
+    """Size of a robot: the height of its standing centre of mass [m], and the factors on times and on the weights of
+    forces.
+    """
 
     height: float
     slow: float
@@ -251,11 +256,11 @@ def scaled_defaults(task: Parameters, robot: RobotDescription) -> dict[str, Any]
         if name not in task.model_fields_set
     }
     weights: Parameters = getattr(task, "weights")  # noqa: B009 - any task's
-    said = weights.model_fields_set if "weights" in task.model_fields_set else set()
+    given_fields = weights.model_fields_set if "weights" in task.model_fields_set else set()
     lighter = {
         name: rounded(type(weights).model_fields[name].default * light)
         for name in ("force", "impulse")
-        if name not in said
+        if name not in given_fields
     }
     if lighter:
         changed["weights"] = weights.model_copy(update=lighter)

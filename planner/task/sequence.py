@@ -32,18 +32,18 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import model_validator
 
-from ...blocks.signals import Phase
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
 from .contact_groups import ALL, contact_points
+from .phase import Phase
 
 FREE = "free"
 Slope = tuple[float, float]
 """Angles [rad] by which ground rises along the world's x and y axes, as those of a scene's boxes."""
 LEVEL: Slope = (0.0, 0.0)
 STEEPEST = math.radians(45.0)
-"""rad; a scene's boxes lean no more."""
+"""Steepest slope [rad]; a scene's boxes lean no more."""
 SHORTEST_JUMP_OVER_AN_EDGE = 0.03
 """Start and landing closer together than this [m] have no room for a step's edge between them."""
 PHASES = {
@@ -69,8 +69,7 @@ class FreeTimes(Parameters):
 
 
 class Hop(FreeTimes):
-    """One of several jumps in a row, relative to where it begins; what is not given is as the task
-    says for all of them."""
+    """Jump in a row of several, relative to where it begins; what is not given is as in the task for all of them."""
 
     rise: float | None = parameter(
         None, unit="m", gt=0.0, le=2.0, text="apex of the centre of mass above standing there"
@@ -136,25 +135,29 @@ class PhaseSpec(FreeTimes):
         return tuple(k for k in contact_points(robot, self.contacts) if k not in off)
 
 
-def check_spans(spans: Sequence[PhaseSpec], flights: int) -> str:
-    """What is wrong with a sequence of phases for this number of jumps; empty if nothing is."""
-    if not PATTERN.fullmatch("".join(span.phase[0] for span in spans)):
+def check_phase_specs(phase_specs: Sequence[PhaseSpec], flights: int) -> str:
+    """Return what is wrong with a sequence of phases for this number of jumps; empty if nothing is."""
+    if not PATTERN.fullmatch("".join(phase_spec.phase[0] for phase_spec in phase_specs)):
         return (
             "the phases must be squat or thrust, then flights with thrust or landing between "
-            "them, then landing; found " + ", ".join(span.phase for span in spans)
+            "them, then landing; found " + ", ".join(phase_spec.phase for phase_spec in phase_specs)
         )
-    found = sum(span.phase == "flight" for span in spans)
+    found = sum(phase_spec.phase == "flight" for phase_spec in phase_specs)
     if found != flights:
         return f"there are {found} flights among the phases but {flights} jumps"
-    if any(span.contacts != ALL or span.raised for span in (spans[0], spans[-1])):
+    if any(
+        phase_spec.contacts != ALL or phase_spec.raised
+        for phase_spec in (phase_specs[0], phase_specs[-1])
+    ):
         return "the robot stands on all contact points in the first and in the last phase"
     return ""
 
 
 @dataclass(frozen=True)
 class StanceLocation:
-    """Where the robot stands between jumps: the soles' middle [m], their heading, how far the body
-    has turned in pitch [rad], and how the ground leans there."""
+    """Place of the robot between jumps: the soles' middle [m], their heading, the body's turn in pitch so far [rad],
+    and the slope of the ground there.
+    """
 
     x: float
     y: float
@@ -170,7 +173,7 @@ class StanceLocation:
         return self.z - a * self.x - b * self.y, a, b
 
     def height(self, x: Any, y: Any) -> Any:
-        """How high the ground under it would be there [m], if it went on; of numbers or arrays."""
+        """Return the height of the ground under it at that place [m], if it went on; of numbers or arrays."""
         if self.slope == LEVEL:
             return self.z + 0.0 * x
         c, a, b = self.plane
@@ -178,8 +181,9 @@ class StanceLocation:
 
 
 def ground_axes(slope: Slope, heading: float = 0.0) -> Array:
-    """Axes along feet of that ``heading``, across them and normal to ground that leans, as the
-    columns of a matrix (3, 3)."""
+    """Return the axes along feet of that ``heading``, across them and normal to ground that leans, as the columns of a
+    matrix (3, 3).
+    """
     cosine, sine = np.cos(heading), np.sin(heading)
     if slope == LEVEL:
         return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
@@ -191,7 +195,7 @@ def ground_axes(slope: Slope, heading: float = 0.0) -> Array:
 
 
 def places_of(hops: Sequence[Hop], slope: Slope = LEVEL) -> tuple[StanceLocation, ...]:
-    """Where the robot stands before the first jump, on ground of that ``slope``, and after each."""
+    """Return the places of the robot before the first jump, on ground of that ``slope``, and after each."""
     found = [StanceLocation(0.0, 0.0, 0.0, 0.0, 0.0, slope)]
     for hop in hops:
         last = found[-1]
@@ -209,8 +213,9 @@ def places_of(hops: Sequence[Hop], slope: Slope = LEVEL) -> tuple[StanceLocation
 
 
 def on_slopes(hops: Sequence[Hop], slope: Slope) -> tuple[Hop, ...]:
-    """The jumps from ground of that ``slope``. Where a jump says nothing else, ground goes on as it
-    leans where the jump begins, and its ``landing_height`` is above that."""
+    """Return the jumps from ground of that ``slope``. Where a jump sets nothing else, ground goes on as it leans where
+    the jump begins, and its ``landing_height`` is above that.
+    """
     found = list[Hop]()
     for hop in hops:
         here = StanceLocation(0.0, 0.0, 0.0, 0.0, 0.0, slope)
@@ -235,15 +240,16 @@ def edge_of(hop: Hop, start: StanceLocation) -> float | None:
 
 
 def changes_ground(hop: Hop, start: StanceLocation) -> bool:
-    """Whether a jump lands on other ground than that on which it begins, going on as it leans."""
+    """Check whether a jump lands on other ground than that on which it begins, going on as it leans."""
     end = places_of([hop], start.slope)[1]
     goes_on = start.height(start.x + end.x, start.y + end.y) - start.z
     return (hop.landing_slope or LEVEL) != start.slope or abs(end.z - goes_on) > 1e-8
 
 
 def step_of(hop: Hop, start: StanceLocation) -> float:
-    """By how much the ground is higher behind the edge under a jump than before it [m], in the line
-    of the jump; where there is no edge, how much higher it lands."""
+    """Return the rise of the ground at the edge under a jump [m], in the line of the jump; where there is no edge, how
+    much higher it lands.
+    """
     edge, up = edge_of(hop, start), hop.landing_height or 0.0
     if edge is None or (start.slope == LEVEL and not hop.landing_slope):
         return up
@@ -267,7 +273,7 @@ class KnownStairs(Parameters):
     steps: int = parameter(text="how many there are", ge=1, le=100)
 
     def passed(self, x: float) -> int:
-        """How many of their edges are behind a place."""
+        """Return the number of their edges that are behind a place."""
         return min(self.steps, max(0, math.floor((x - self.x) / self.run + 1.0 + 1e-9)))
 
     def under(self, hops: Sequence[Hop]) -> tuple[Hop, ...]:
@@ -291,7 +297,7 @@ class KnownStairs(Parameters):
 
 
 class RoughGround(Parameters):
-    """How uneven the ground under a row of jumps is. Every number is uniform and independent."""
+    """Unevenness of the ground under a row of jumps. Every number is uniform and independent."""
 
     seed: int = parameter(0, ge=0, le=2**31, text="what the ground is drawn by")
     steps: float = parameter(

@@ -1,4 +1,4 @@
-"""A task says which jump is wanted. It is written in YAML or made in Python.
+"""Task of a jump: the motion that is wanted. It is written in YAML or made in Python.
 
 name: forward_10cm
 rise: 15 cm
@@ -21,7 +21,7 @@ from ...files.validation import describe, names_at
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
 from .contact_groups import in_turn, wrong_times
-from .files import JumpTaskError, PlacedFile
+from .files import JumpTaskError, LocatedFile
 from .margins import Margins
 from .recipe import choices, chosen_fields
 from .scaling import scaled_defaults
@@ -35,7 +35,7 @@ from .sequence import (
     RoughGround,
     Slope,
     StanceLocation,
-    check_spans,
+    check_phase_specs,
     on_slopes,
     places_of,
 )
@@ -48,7 +48,7 @@ PLAN_FORMAT = 1
 
 
 class Knots(Parameters):
-    """How many intervals each phase is divided into; about 60 in all are enough for a small biped."""
+    """Numbers of intervals of each phase; about 60 in all are enough for a small biped."""
 
     squat: int = parameter(8, ge=2, le=200, text="the squat")
     thrust: int = parameter(16, ge=4, le=200, text="the thrust")
@@ -274,20 +274,20 @@ class JumpTask(FreeTimes):
             wrong = wrong_times(lifted, given, phase)
             if wrong:
                 raise ValueError(f"{name}: {wrong}")
-        wrong = check_spans(self.spans(), len(self.hops()))
+        wrong = check_phase_specs(self.phase_specs(), len(self.hops()))
         if wrong:
             raise ValueError(wrong)
         return self
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """As pydantic's, without what ``hops`` and ``places`` have kept."""
+        """Copy the task as pydantic does, without what ``hops`` and ``places`` have kept."""
         copy = super().model_copy(update=update, deep=deep)
         for name in ("_every_hop", "_every_place"):
             vars(copy).pop(name, None)
         return copy
 
     def hops(self) -> tuple[Hop, ...]:
-        """The jumps in a row, everything filled in; one of them if nothing else is asked for."""
+        """Return the jumps in a row, everything filled in; a single one by default."""
         return self._every_hop
 
     @cached_property
@@ -307,7 +307,7 @@ class JumpTask(FreeTimes):
         return row if drawn is None else drawn.under(row)
 
     def places(self) -> tuple[StanceLocation, ...]:
-        """Where the robot stands at the start, between its jumps, and at the end."""
+        """Return the places of the robot at the start, between its jumps, and at the end."""
         return self._every_place
 
     @cached_property
@@ -316,10 +316,10 @@ class JumpTask(FreeTimes):
 
     @property
     def leans(self) -> bool:
-        """Whether the ground leans anywhere where the robot stands."""
+        """True if the ground leans anywhere where the robot stands."""
         return any(place.slope != LEVEL for place in self.places())
 
-    def spans(self) -> tuple[PhaseSpec, ...]:
+    def phase_specs(self) -> tuple[PhaseSpec, ...]:
         """Return the sequence of contacts, with all times that are given and numbers of knots."""
         hops, knots = self.hops(), self.knots
         if self.phases is None:
@@ -337,32 +337,35 @@ class JumpTask(FreeTimes):
             found = list(self.phases)
         flights = iter(hop.flight_time for hop in hops)
         filled = []
-        for span in found:
-            of_jump = next(flights, None) if span.phase == "flight" else None
-            time = of_jump if span.time is None else span.time
-            count = span.knots or int(getattr(knots, span.phase))
-            filled.append(span.model_copy(update={"time": time, "knots": count}))
+        for phase_spec in found:
+            of_jump = next(flights, None) if phase_spec.phase == "flight" else None
+            time = of_jump if phase_spec.time is None else phase_spec.time
+            count = phase_spec.knots or int(getattr(knots, phase_spec.phase))
+            filled.append(phase_spec.model_copy(update={"time": time, "knots": count}))
         return tuple(filled)
 
-    def _in_turn(self, spans: list[PhaseSpec]) -> list[PhaseSpec]:
+    def _in_turn(self, phase_specs: list[PhaseSpec]) -> list[PhaseSpec]:
         """Return the phases with those before and behind a flight in parts, where feet leave or land in turn."""
         found = list[PhaseSpec]()
-        for span in spans:
-            lifted = {"thrust": self.take_off, "landing": self.touchdown}.get(span.phase)
+        for phase_spec in phase_specs:
+            lifted = {"thrust": self.take_off, "landing": self.touchdown}.get(phase_spec.phase)
             if not lifted:
-                found.append(span)
+                found.append(phase_spec)
                 continue
-            whole = {"phase": span.phase, "time": span.time}
-            knots, landing = int(getattr(self.knots, span.phase)), span.phase == "landing"
+            whole = {"phase": phase_spec.phase, "time": phase_spec.time}
+            knots, landing = (
+                int(getattr(self.knots, phase_spec.phase)),
+                phase_spec.phase == "landing",
+            )
             found += [PhaseSpec(**part) for part in in_turn(whole, lifted, knots, landing=landing)]
         return found
 
     def start_joints(self, robot: RobotDescription) -> dict[str, float]:
-        """Joint angles [rad] by name at the start. Raises ``JumpTaskError`` for an unknown joint."""
+        """Return the joint angles [rad] by name at the start. Raises ``JumpTaskError`` for an unknown joint."""
         return _stance(robot, self.initial, "initial")
 
     def end_joints(self, robot: RobotDescription) -> dict[str, float]:
-        """Joint angles [rad] by name at the end. Raises ``JumpTaskError`` for an unknown joint."""
+        """Return the joint angles [rad] by name at the end. Raises ``JumpTaskError`` for an unknown joint."""
         return _stance(robot, self.final, "final")
 
     def equipped(self, robot: RobotDescription) -> RobotDescription:
@@ -410,7 +413,7 @@ class JumpTask(FreeTimes):
         return self.model_dump(mode="json", exclude=left_out, exclude_none=True)
 
     def hash(self, robot: RobotDescription) -> str:
-        """What a plan of this task is kept under: the same for the same task, robot and format."""
+        """Return the key under which a plan of this task is kept: the same for the same task, robot and format."""
         whole = {
             "format": PLAN_FORMAT,
             "task": self.resolved(robot).content(),
@@ -426,8 +429,9 @@ def content_name(content: object) -> str:
 
 
 def planned_robot(robot: RobotDescription) -> dict[str, Any]:
-    """What a plan depends on of a robot. The task says itself which actuators it is planned for; no plan
-    depends on sensors that are mounted on links."""
+    """Return what a plan depends on of a robot. The task itself names the actuators it is planned for; no plan depends
+    on sensors that are mounted on links.
+    """
     return robot.changed(profile="", sensors=robot.sensors.built_in).model_dump(mode="json")
 
 
@@ -443,7 +447,7 @@ def _stance(robot: RobotDescription, given: Mapping[str, float], which: str) -> 
 
 
 def make_task(
-    values: Mapping[str, Any], *, where: str = "task", source: PlacedFile | None = None
+    values: Mapping[str, Any], *, where: str = "task", source: LocatedFile | None = None
 ) -> JumpTask:
     """Return a task from plain values, quantities as numbers or text.
 
@@ -461,7 +465,7 @@ def make_task(
         for problem in error.errors():
             line, place = _explain(problem), where
             if source is not None and not problem["loc"]:
-                place = source.place_of_words(line)
+                place = source.location_of_words(line)
             elif source is not None:
                 place = source.place(problem["loc"], key=problem["type"] == "extra_forbidden")
             lines.append(f"{place}: {line}")
@@ -469,7 +473,7 @@ def make_task(
 
 
 def _explain(problem: Any) -> str:
-    """One of pydantic's problems as a line: the key, what is expected and what was found."""
+    """Return one of pydantic's problems as a line: the key, what is expected and what was found."""
     location = problem["loc"]
     if problem["type"] == "extra_forbidden":
         near = nearest(str(location[-1]), names_at(JumpTask, location[:-1]), 1, 0.0)

@@ -1,4 +1,4 @@
-"""Makes the links and joints of a description from the bodies of a file.
+"""Conversion of the bodies of a file to the links and joints of a description.
 
 Bodies that no joint moves become part of the body they are fixed to, and every link's frame is put
 at its joint and turned parallel to the base's at the zero of all joints, so that joint axes may
@@ -18,7 +18,7 @@ import numpy as np
 
 from ...files.problems import listing
 from ...mathematics.arrays import Array
-from ..validation import RobotError, RobotFault
+from ..validation import DescriptionError, RobotError
 from .capsules import Capsule, coarse
 from .hulls import RawShape
 from .raw_model import Inertial, RawBody, RawJoint, RawModel, joined
@@ -67,7 +67,7 @@ class LinkTree:
 
 
 def tidy(values: Any, digits: int = 11) -> list[float]:
-    """Plain numbers without rounding errors, so that every machine reads the same robot."""
+    """Return plain numbers without rounding errors, so that every machine reads the same robot."""
     return [float(value) for value in np.round(np.asarray(values, dtype=float), digits) + 0.0]
 
 
@@ -230,7 +230,7 @@ def _is_planar(body: RawBody) -> bool:
 
 
 def _error(model: RawModel, message: str, expected: str = "", found: str = "") -> RobotError:
-    return RobotError(str(model.path), [RobotFault((), message, expected, found)])
+    return RobotError(str(model.path), [DescriptionError((), message, expected, found)])
 
 
 def _axis(axis: Array) -> list[float]:

@@ -43,7 +43,7 @@ class Capsule:
 
 
 def coarse(values: Array) -> list[float]:
-    """Lengths [m] to a tenth of a millimetre, the same on every machine.
+    """Round lengths [m] to a tenth of a millimetre, the same on every machine.
 
     The small shift keeps numbers that people write, such as 0.01125, off the edge between two
     roundings, where the last bit of a computation would decide.
@@ -78,7 +78,7 @@ def of_ellipsoid(sizes: Array) -> list[Capsule]:
 
 
 def of_box(sizes: Array) -> list[Capsule]:
-    """Up to three capsules that fill a box of these half lengths (3,)."""
+    """Return up to three capsules that fill a box of these half lengths (3,)."""
     long, middle, short = (int(k) for k in np.argsort(-sizes, kind="stable"))
     radius = float(sizes[short])
     room = float(sizes[middle]) - radius

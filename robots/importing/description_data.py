@@ -24,9 +24,9 @@ import numpy as np
 
 from ...files.problems import listing
 from ..robot_description import SLIDE_UNITS, Joint, Link, RobotDescription
-from ..validation import RobotFault
-from ..validation.faults import nearest
-from ..validation.find_faults import shown
+from ..validation import DescriptionError
+from ..validation.errors import nearest
+from ..validation.find_errors import shown
 from .build import BodyFrame, LinkTree, build, tidy
 from .looks import link_looks
 from .odd_bodies import odd_bodies
@@ -47,12 +47,12 @@ class Overlay:
 
     def __init__(self, data: Mapping[str, Any]) -> None:
         self.data = data
-        self.faults: list[RobotFault] = []
+        self.errors: list[DescriptionError] = []
 
     def add(self, path: tuple[str | int, ...], message: str, expected: str = "", found: str = "",
             fix: str = "") -> None:  # fmt: skip
         """Note a fault."""
-        self.faults.append(RobotFault(path, message, expected, found, fix))
+        self.errors.append(DescriptionError(path, message, expected, found, fix))
 
     def mapping(self, key: str) -> Mapping[str, Any]:
         """Return the mapping under a key; empty, and a fault, where it is something else."""
@@ -124,7 +124,7 @@ class Overlay:
         return None
 
     def feet(self, built: LinkTree) -> tuple[list[Any], list[Any]]:
-        """Feet and contact points as in a full description, from both ways to write them."""
+        """Return the feet and contact points as in a full description, from both ways to write them."""
         feet, contacts = [], []
         given = self.data.get("feet") or []
         if not isinstance(given, list):
@@ -192,7 +192,7 @@ class Overlay:
         return None
 
     def points(self, built: LinkTree) -> dict[str, Any]:
-        """Named points, each on a link of the description or in the frame of a body of the file."""
+        """Return named points, each on a link of the description or in the frame of a body of the file."""
         found: dict[str, Any] = {}
         links = [link["name"] for link in built.links]
         for name, value in self.mapping("points").items():
@@ -205,8 +205,9 @@ class Overlay:
         return found
 
     def thrusters(self, built: LinkTree, model: RawModel) -> dict[str, Any]:
-        """Thrusters as in a full description: those of the file, with what the YAML changes, and the YAML's
-        own, each on a link of the description or in the frame of a body of the file."""
+        """Return the thrusters as in a full description: those of the file, with what the YAML changes, and the YAML's
+        own, each on a link of the description or in the frame of a body of the file.
+        """
         found: dict[str, Any] = {
             name: {
                 "link": raw.body, "position": raw.position.tolist(), "axis": raw.axis.tolist(),
@@ -354,9 +355,11 @@ TAGS = {"links": ("link", "body"), "joints": ("joint", "joint")}
 """The elements of a URDF and of MJCF that describe a part of a description."""
 
 
-def written_path(fault: RobotFault, data: Mapping[str, Any]) -> tuple[str | int, ...]:
+def written_path(
+    description_error: DescriptionError, data: Mapping[str, Any]
+) -> tuple[str | int, ...]:
     """Return the path of a fault as a short YAML has it: links and joints by name, contacts by foot."""
-    path = fault.path
+    path = description_error.path
     if len(path) > 1 and path[0] == "contacts" and isinstance(path[1], int):
         # Contact points of a short YAML are in its feet.
         feet = [foot["name"] for foot in data["feet"]]
@@ -367,24 +370,26 @@ def written_path(fault: RobotFault, data: Mapping[str, Any]) -> tuple[str | int,
     return path
 
 
-def placed_in_model(fault: RobotFault, data: Mapping[str, Any], model: RawModel) -> RobotFault:
+def located_in_model(
+    description_error: DescriptionError, data: Mapping[str, Any], model: RawModel
+) -> DescriptionError:
     """Return the fault with the line of the link or joint in the URDF or MJCF file, if it is one's."""
-    path = written_path(fault, data)
+    path = written_path(description_error, data)
     line = column = 0
     if len(path) > 1 and path[0] in TAGS:
         tag = TAGS[str(path[0])][not model.is_urdf]
         line, column = XmlFile(model.path).place(tag, str(path[1]))
-    return replace(fault, path=path, file=str(model.path), line=line, column=column)
+    return replace(description_error, path=path, file=str(model.path), line=line, column=column)
 
 
 @dataclass(frozen=True)
 class Imported:
-    """Result of an import: the description's ``data``, the ``faults`` of the YAML, what the file lacks or what is
+    """Result of an import: the description's ``data``, the ``errors`` of the YAML, what the file lacks or what is
     approximated in ``notes``, and the ``model`` and tree it was made from.
     """
 
     data: dict[str, Any]
-    faults: list[RobotFault]
+    errors: list[DescriptionError]
     notes: list[str]
     model: RawModel
     built: LinkTree
@@ -438,7 +443,7 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
     if thrusters := overlay.thrusters(built, model):
         data["thrusters"] = thrusters
     _stand_within_limits(data)
-    return Imported(data, overlay.faults, notes, model, built)
+    return Imported(data, overlay.errors, notes, model, built)
 
 
 def _stand_within_limits(data: dict[str, Any]) -> None:

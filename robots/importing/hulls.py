@@ -30,8 +30,9 @@ AT_ONCE = 16
 
 
 def _directions() -> Array:
-    """Directions (n, 3) all around. With each there are its mirror images in all coordinate planes, and none is at right
-    angles to a coordinate axis or plane, which whole faces of meshes are along."""
+    """Return directions (n, 3) all around. With each there are its mirror images in all coordinate planes, and none is
+    at right angles to a coordinate axis or plane, which whole faces of meshes are along.
+    """
     found = list[tuple[float, ...]]()
     for one in ((0.12, 0.31, 0.95), (0.17, 0.58, 0.79), (0.43, 0.52, 0.74), (0.06, 0.13, 0.99)):
         for turned in permutations(one):

@@ -35,7 +35,7 @@ def left_out(model: Any, spec: Any) -> Iterator[str]:
 
 
 def _contacts(model: Any) -> Iterator[str]:
-    """Contact parameters of what touches, by value."""
+    """Yield the contact parameters of what touches, by value."""
     touching = [
         g for g in range(model.ngeom)
         if model.geom_bodyid[g] and (model.geom_contype[g] or model.geom_conaffinity[g])
@@ -74,7 +74,7 @@ def _contacts(model: Any) -> Iterator[str]:
 
 
 def _joints(model: Any) -> Iterator[str]:
-    """Springs and damping that grows with speed."""
+    """Yield the springs and damping that grows with speed."""
     names = [model.joint(j).name for j in range(model.njnt)]
     springs = by_value([f"{value:g}" for value in model.jnt_stiffness], names, "0")
     if springs:
@@ -89,7 +89,7 @@ def _joints(model: Any) -> Iterator[str]:
 
 
 def _servos(model: Any) -> Iterator[str]:
-    """Gains of servos, dynamics of actuators, and actuators that move no single joint."""
+    """Yield the gains of servos, dynamics of actuators, and actuators that move no single joint."""
     import mujoco
 
     kinds, bias, dyn = mujoco.mjtTrn, mujoco.mjtBias, mujoco.mjtDyn

@@ -79,7 +79,7 @@ def _said(file: XmlFile, tag: str, inside: tuple[str, ...]) -> Iterator[Said]:
 
 
 def _contacts(said: list[Said]) -> Iterator[str]:
-    """Contact parameters, by value."""
+    """Yield the contact parameters, by value."""
     friction = _values(said, FRICTION, FRICTION.get)
     if friction:
         yield f"left out: friction coefficient {friction}; friction is the ground's, robot.ground.friction in a graph or trial"
@@ -95,7 +95,7 @@ def _contacts(said: list[Said]) -> Iterator[str]:
 
 
 def _joints(file: XmlFile) -> Iterator[str]:
-    """Springs, soft limits, and gears that couple joints."""
+    """Yield the springs, soft limits, and gears that couple joints."""
     springs = _values(_said(file, "joint", ("dynamics",)), SPRINGS)
     if springs:
         yield f"left out: springs of joints, {springs}; joints here have none"
@@ -118,7 +118,7 @@ def _joints(file: XmlFile) -> Iterator[str]:
 
 
 def _soft_limits(file: XmlFile) -> Iterator[str]:
-    """Limits of safety controllers that are narrower than the joint's."""
+    """Yield the limits of safety controllers that are narrower than the joint's."""
     for joint in file.root.findall("joint"):
         soft, hard = joint.find("safety_controller"), joint.find("limit")
         if soft is None or hard is None:

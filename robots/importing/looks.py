@@ -92,7 +92,7 @@ def _material_color(material: ElementTree.Element) -> str | None:
 
 
 def hex_color(rgba: Array) -> str | None:
-    """``#RRGGBB`` of red, green and blue from 0 to 1; None where one is no number."""
+    """Return ``#RRGGBB`` of red, green and blue from 0 to 1; None where one is no number."""
     if not np.isfinite(rgba[:3]).all():
         return None
     levels = np.rint(255.0 * np.clip(rgba[:3], 0.0, 1.0)).astype(int)

@@ -28,7 +28,7 @@ FINEST = 5000.0
 COARSER = 1.15
 """Least factor by which the cells grow from one try to the next."""
 _PLACES = np.array([1 << 40, 1 << 20, 1])
-"""Makes one number of the three of a cell."""
+"""Factors that make one number of the three of a cell."""
 
 
 def mesh_triangles(path: Path) -> Array:
@@ -74,7 +74,7 @@ def _obj_triangles(text: str) -> Array:
 
 
 def simplified(triangles: Array, most: int) -> tuple[Array, Indices]:
-    """Corners (n, 3) and triangles (m, 3) of nearly the same surface, of ``most`` triangles or fewer.
+    """Return corners (n, 3) and triangles (m, 3) of nearly the same surface, of ``most`` triangles or fewer.
 
     Corners in one cell of a cubic grid become one, at their mean (vertex clustering: Rossignac and
     Borrel, 1993). The cells are as small as the number of triangles allows.

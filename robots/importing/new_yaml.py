@@ -20,8 +20,8 @@ from ...files.problems import listing
 from ...mathematics.rotations import quaternions_of_matrices
 from ..plausible_size import wrong_size
 from ..robot_description import RobotDescription
-from ..validation import RobotError, find_faults
-from ..validation.faults import number, vector
+from ..validation import RobotError, find_errors
+from ..validation.errors import number, vector
 from .build import BodyFrame, LinkTree, tidy
 from .capsules import Capsule
 from .description_data import Imported, import_robot
@@ -38,9 +38,9 @@ def new_yaml(file: Path, target: Path) -> tuple[str, list[str]]:
     guessed, more = guess(import_robot(file, {}))
     feet, held = guessed["feet"], guessed["held"]
     imported = import_robot(file, {"name": target.stem, **guessed})
-    faults = find_faults(imported.data)
-    if faults:
-        raise RobotError(str(file), _placed(imported, faults))
+    errors = find_errors(imported.data)
+    if errors:
+        raise RobotError(str(file), _placed(imported, errors))
     robot = RobotDescription.model_validate(imported.data)
     robot, fitted = fit_to_ground(robot, False, imported.model.pose)
     notes = [*more, *imported.notes, *fitted, *wrong_size(robot)]
@@ -76,10 +76,13 @@ def guess(bare: Imported) -> tuple[dict[str, Any], list[str]]:
     return {"feet": feet, "held": held}, notes
 
 
-def _placed(imported: Imported, faults: Any) -> list[Any]:
-    from .description_data import placed_in_model
+def _placed(imported: Imported, errors: Any) -> list[Any]:
+    from .description_data import located_in_model
 
-    return [placed_in_model(fault, imported.data, imported.model) for fault in faults]
+    return [
+        located_in_model(description_error, imported.data, imported.model)
+        for description_error in errors
+    ]
 
 
 SAME_DIRECTION = 1e-6
@@ -109,7 +112,7 @@ def guess_feet(model: RawModel, built: LinkTree) -> list[dict[str, Any]]:
 
 
 def _limb_ends(built: LinkTree) -> list[str]:
-    """Links at the end of a chain of two joints or more."""
+    """Return the links at the end of a chain of two joints or more."""
     parent = {joint["child"]: joint["parent"] for joint in built.joints}
     ends = [link for link in parent if link not in parent.values()]
     return [link for link in ends if parent[link] != built.base]
@@ -170,8 +173,9 @@ def _foot(model: RawModel, built: LinkTree, link: str) -> dict[str, Any]:
 def _sole(
     model: RawModel, built: LinkTree, link: str, bottom: float, foot: BodyFrame
 ) -> list[list[float]]:
-    """Four corners [m, body of the foot] around what of a link's shapes is near the ground, where a leg of so
-    many joints has an ankle and the shapes are wide; else none."""
+    """Return four corners [m, body of the foot] around what of a link's shapes is near the ground, where a leg of so
+    many joints has an ankle and the shapes are wide; else none.
+    """
     carrier = {joint["child"]: joint["parent"] for joint in built.joints}
     count, above = 0, link
     while above in carrier:

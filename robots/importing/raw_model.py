@@ -37,7 +37,7 @@ NOTHING = Inertial(0.0, np.zeros(3), np.zeros((3, 3)))
 
 
 def joined(bodies: list[Inertial]) -> Inertial:
-    """One body that is made of several bodies, all given in the same frame."""
+    """Join several bodies, all given in the same frame, into one."""
     bodies = [body for body in bodies if body.mass > 0.0 or np.any(body.inertia)]
     if len(bodies) <= 1:
         return bodies[0] if bodies else NOTHING

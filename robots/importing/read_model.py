@@ -149,7 +149,7 @@ def _refuse_closed_loops(spec: Any, file: XmlFile) -> None:
 
 
 def _tied_joints(spec: Any) -> dict[str, str]:
-    """Joints that an equality of MJCF ties to another one or to a value, and which."""
+    """Return the joints that an equality of MJCF ties to another one or to a value, and which."""
     import mujoco
 
     return {
@@ -164,8 +164,9 @@ def _one_line(error: Exception) -> str:
 
 
 def _tidy(values: Array) -> Array:
-    """Directions without the rounding errors of angles such as 1.5707963: nearly straight ones
-    are made straight."""
+    """Return directions without the rounding errors of angles such as 1.5707963: nearly straight ones are made
+    straight.
+    """
     values = np.array(values, dtype=float)
     nearest = np.round(values)
     return np.where(np.abs(values - nearest) < 1e-10, nearest, values) + 0.0
@@ -462,7 +463,7 @@ def _look(model: Any, k: int, meshes: dict[str, TakenMesh]) -> RawLook:
 
 
 def _key_frame(model: Any) -> dict[str, float]:
-    """Joint angles of the key frame called home or stand, else of the first."""
+    """Return the joint angles of the key frame called home or stand, else of the first."""
     import mujoco
 
     names = [model.key(k).name for k in range(model.nkey)]

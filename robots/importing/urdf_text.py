@@ -9,8 +9,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from ...files.problems import listing
-from ..validation import RobotError, RobotFault
-from ..validation.faults import number
+from ..validation import DescriptionError, RobotError
+from ..validation.errors import number
 from .urdf_words import misspelt, wrong_inertia
 from .xacro_text import XACRO, expand_xacro
 
@@ -55,8 +55,8 @@ class XmlFile:
         except ElementTree.ParseError as error:
             line, column = error.position
             what = f"this is no XML: {error.msg.partition(':')[0]}"
-            fault = RobotFault((), what, line=line, column=column + 1)
-            raise RobotError(str(path), [fault]) from error
+            description_error = DescriptionError((), what, line=line, column=column + 1)
+            raise RobotError(str(path), [description_error]) from error
         if self.root.tag not in ("robot", "mujoco"):
             raise self.error(
                 "this is neither a URDF nor an MJCF file",
@@ -86,14 +86,14 @@ class XmlFile:
 
     def error(self, message: str, expected: str = "", found: str = "", fix: str = "") -> RobotError:
         """Return an error of the file as a whole."""
-        return RobotError(str(self.path), [RobotFault((), message, expected, found, fix)])
+        return RobotError(str(self.path), [DescriptionError((), message, expected, found, fix)])
 
     def has(self, tag: str, name: str) -> bool:
         """Check whether the root has an element with this tag and name."""
         return any(element.get("name") == name for element in self.root.findall(tag))
 
     def place(self, tag: str, name: str) -> tuple[int, int]:
-        """Line and column of the element of that tag and name; (0, 0) if it is not found."""
+        """Return the line and column of the element of that tag and name; (0, 0) if it is not found."""
         pattern = rf"<{tag}\s(?:[^>]*?\s)?name\s*=\s*[\"']{re.escape(name)}[\"']"
         found = re.search(pattern, self.text)
         if not found:
@@ -133,11 +133,11 @@ def _range(joint: ElementTree.Element) -> str:
 
 def check_urdf(file: XmlFile) -> None:
     """Raise ``RobotError`` with everything that no reader of a URDF could make sense of."""
-    faults: list[RobotFault] = []
+    errors: list[DescriptionError] = []
 
     def add(tag: str, name: str, message: str, expected: str = "", found: str = "") -> None:
         line, column = file.place(tag, name)
-        faults.append(RobotFault((), message, expected, found, line=line, column=column))
+        errors.append(DescriptionError((), message, expected, found, line=line, column=column))
 
     links = [link.get("name", "") for link in file.root.findall("link")]
     if not links:
@@ -198,11 +198,11 @@ def check_urdf(file: XmlFile) -> None:
                 add("joint", name, f"the limits of joint {name} leave it no room or are reversed",
                     "lower < upper", f"lower {number(lower)}, upper {number(upper)}")  # fmt: skip
     roots = [name for name in dict.fromkeys(links) if name not in carried]
-    if len(roots) != 1 and not faults:
+    if len(roots) != 1 and not errors:
         add("link", (roots or links)[0], f"the links make no single tree: {len(roots)} have no parent",
             "one link that no joint carries", listing(roots))  # fmt: skip
-    if faults:
-        raise RobotError(str(file.path), faults)
+    if errors:
+        raise RobotError(str(file.path), errors)
 
 
 def _value(text: str | None) -> float:

@@ -10,7 +10,7 @@ import contextlib
 import io
 from pathlib import Path
 
-from ..validation import RobotError, RobotFault
+from ..validation import DescriptionError, RobotError
 from .package_files import find_package
 
 XACRO = ".xacro"
@@ -18,7 +18,7 @@ XACRO = ".xacro"
 
 
 class _NoPackage(Exception):
-    """There is no package of that name; its argument is the name."""
+    """Error: there is no package of that name; its argument is the name."""
 
 
 def expand_xacro(path: Path) -> str:
@@ -75,4 +75,4 @@ def _missing(error: BaseException | None) -> str:
 
 
 def _error(path: Path, message: str, expected: str, fix: str = "") -> RobotError:
-    return RobotError(str(path), [RobotFault((), message, expected, "", fix)])
+    return RobotError(str(path), [DescriptionError((), message, expected, "", fix)])

@@ -1,6 +1,6 @@
 """Validation of data as a robot that can exist: every fault at once, each with its place."""
 
-from .faults import RobotError, RobotFault
-from .find_faults import find_faults
+from .errors import DescriptionError, RobotError
+from .find_errors import find_errors
 
-__all__ = ["RobotError", "RobotFault", "find_faults"]
+__all__ = ["DescriptionError", "RobotError", "find_errors"]

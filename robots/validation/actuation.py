@@ -10,7 +10,7 @@ import numpy as np
 
 from ...files.problems import listing
 from ..robot_description import SLIDE_UNITS, ActuatorProfile, MotorRating, Thruster, Transmission
-from .faults import Draft, Path, nearest, number, read, vector
+from .errors import Draft, Path, nearest, number, read, vector
 from .structure import check_axis
 
 LARGEST_CONDITION = 1e8

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from ..robot_description import ContactPoint, Foot, Joint
-from .faults import Draft, Path, number, vector
+from .errors import Draft, Path, number, vector
 
 MARGIN = 1e-9
 """Tolerance of a pose at a joint's limit [rad, m]: rounding."""
@@ -15,8 +15,8 @@ MARGIN = 1e-9
 def check_feet(draft: Draft) -> None:
     """Report feet on unknown links or without contact points, and points that nothing can touch."""
     links, feet = draft.names("links"), draft.names("feet")
-    contacts = draft.parts("contacts", ContactPoint)
-    for k, foot in draft.parts("feet", Foot):
+    contacts = draft.elements("contacts", ContactPoint)
+    for k, foot in draft.elements("feet", Foot):
         if foot.link not in links:
             draft.unknown(
                 ("feet", k, "link"), f"the link of foot {foot.name}", foot.link, "link", links
@@ -62,7 +62,7 @@ def check_poses(draft: Draft) -> None:
     joints = draft.names("joints")
     limits = {
         joint.name: (k, *joint.limits)
-        for k, joint in draft.parts("joints", Joint)
+        for k, joint in draft.elements("joints", Joint)
         if joint.limits is not None and joint.limits[0] < joint.limits[1]
     }
     angles = {key: dict(draft.entries(key)) for key in ("standing", "held")}

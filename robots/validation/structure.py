@@ -11,10 +11,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...files.problems import listing
-from ..part import Vector3
+from ..element import Vector3
 from ..robot_description import Appearance, Box, Joint, Link, Mesh
 from ..shapes import THINNEST, Hull, is_body
-from .faults import Draft, Path, nearest, number, read, vector
+from .errors import Draft, Path, nearest, number, read, vector
 
 RESERVED = {"links": ("world",), "joints": ("base",), "contacts": ("floor",)}
 """Names that the models keep for themselves."""
@@ -55,7 +55,7 @@ def check_tree(draft: Draft) -> None:
         return
     if base not in links:
         draft.unknown(("base",), "the base", base, "link", links)
-    joints = draft.parts("joints", Joint)
+    joints = draft.elements("joints", Joint)
     carrier: dict[str, Joint] = {}
     sound = base in links
     for k, joint in joints:
@@ -119,11 +119,11 @@ def _check_connection(draft: Draft, links: list[str], base: str, carrier: dict[s
 def _unread_joint(draft: Draft) -> bool:
     """Check whether some joint could not be read, so that links may seem to hang on nothing."""
     found = draft.data.get("joints")
-    return not isinstance(found, (list, tuple)) or len(draft.parts("joints", Joint)) < len(found)
+    return not isinstance(found, (list, tuple)) or len(draft.elements("joints", Joint)) < len(found)
 
 
 def _index(draft: Draft, name: str) -> int:
-    return next(k for k, joint in draft.parts("joints", Joint) if joint.name == name)
+    return next(k for k, joint in draft.elements("joints", Joint) if joint.name == name)
 
 
 def _check_order(draft: Draft, base: str, joints: list[Joint]) -> None:
@@ -160,7 +160,7 @@ UNIT = 1e-6
 
 def check_joints(draft: Draft) -> None:
     """Report origins that are not finite, axes that are no direction, limits that are reversed."""
-    for k, joint in draft.parts("joints", Joint):
+    for k, joint in draft.elements("joints", Joint):
         path: Path = ("joints", k)
         if not all(map(math.isfinite, joint.origin)):
             draft.add(
@@ -219,7 +219,7 @@ def check_bodies(draft: Draft) -> None:
     The base of a robot that is bolted to the world needs no mass: nothing moves it.
     """
     bolted = draft.data.get("base") if draft.data.get("base_joint") == "fixed" else None
-    for k, link in draft.parts("links", Link):
+    for k, link in draft.elements("links", Link):
         path: Path = ("links", k)
         empty = link.mass == 0.0 and not any(link.inertia)
         if empty and link.name == bolted:
@@ -289,23 +289,23 @@ def check_looks(draft: Draft) -> None:
         if not isinstance(look, Appearance):
             continue
         solid: Mapping[str, Sequence[Mesh | Box]] = {"meshes": look.meshes, "boxes": look.boxes}
-        for kind, parts in solid.items():
-            for k, part in enumerate(parts):
+        for kind, elements in solid.items():
+            for k, element in enumerate(elements):
                 path = ("looks", name, kind, k)
                 what = f"{'a mesh' if kind == 'meshes' else 'a box'} of link {name}"
-                more = part.scale if isinstance(part, Mesh) else ()
-                if not all(map(math.isfinite, (*part.position, *part.orientation, *more))):
+                more = element.scale if isinstance(element, Mesh) else ()
+                if not all(map(math.isfinite, (*element.position, *element.orientation, *more))):
                     draft.add(path, f"{what} is nowhere", "finite numbers", "others")
-                elif not any(part.orientation):
+                elif not any(element.orientation):
                     draft.add(
                         (*path, "orientation"), f"{what} has no orientation",
-                        "a quaternion x, y, z, w that is not zero", str(list(part.orientation)),
+                        "a quaternion x, y, z, w that is not zero", str(list(element.orientation)),
                         "orientation: [0, 0, 0, 1]",
                     )  # fmt: skip
-                if isinstance(part, Box) and 2.0 * part.round > min(part.size):
+                if isinstance(element, Box) and 2.0 * element.round > min(element.size):
                     draft.add(
                         (*path, "round"), f"{what} is rounded by more than half of its least side",
-                        f"at most {0.5 * min(part.size):g} m", f"{part.round:g} m",
+                        f"at most {0.5 * min(element.size):g} m", f"{element.round:g} m",
                     )  # fmt: skip
         for k, turned in enumerate(look.turned):
             path = ("looks", name, "turned", k)

@@ -1,10 +1,10 @@
-"""A block that works in the background: what stands for it in the graph, and gives it its jobs.
+"""Block that works in the background: its stand-in in the graph, which sends it its jobs.
 
 It samples the inputs at every run and gives them to a worker, a process that runs the block itself; the
 outputs that follow from them appear N runs later, neither sooner nor later. So it has the outputs of
 the block followed by a delay of N runs, to the byte. In virtual time the run waits for a result that is
-due. In real time it never waits: a result that is late is counted, and the block's policy says what the
-outputs are meanwhile.
+due. In real time it never waits: a result that is late is counted, and the block's policy sets the
+outputs meanwhile.
 
 What has been sampled and is not yet shown is part of the state, as is the block's own state after the
 run that is shown. So a snapshot holds all that it takes to compute what is under way again.
@@ -44,7 +44,7 @@ END_TIME = 1.0
 
 @dataclass(frozen=True)
 class Background:
-    """How a block works in the background.
+    """Settings of a block that works in the background.
 
     Attributes:
         latency: after how many runs of the block the outputs appear, from 1.
@@ -75,7 +75,7 @@ class BackgroundBlock(Block):
 
     @classmethod
     def is_moore(cls) -> bool:
-        """Outputs follow from earlier inputs alone."""
+        """Return true: outputs follow from earlier inputs alone."""
         return True
 
     @classmethod
@@ -86,7 +86,7 @@ class BackgroundBlock(Block):
         robot: RobotDescription | None = None,
         graph_folder: Path | None = None,
     ) -> type[Block]:
-        """The class itself: it was made of a special one."""
+        """Return the class itself, which was made for a specialized class."""
         return cls
 
     @classmethod
@@ -103,12 +103,12 @@ class BackgroundBlock(Block):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """What the block requires."""
+        """Return the block's unmet requirements."""
         return cls._block_type.requires(params, context)
 
     @classmethod
     def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
-        """What the block exports."""
+        """Return the block's exported values."""
         return cls._block_type.exported_values(params, context)
 
     @classmethod
@@ -263,7 +263,7 @@ class BackgroundBlock(Block):
                 self._sampled[slot] = -1
 
     def _be_late(self, due: int) -> None:
-        """Count the late result and do what the policy says; an older one may have come meanwhile."""
+        """Count the late result and apply the policy; an older one may have come meanwhile."""
         worker, background = self._worker, self._background
         assert worker is not None
         self._late += 1
@@ -357,24 +357,24 @@ class BackgroundBlock(Block):
         return self._warnings
 
     def worker_times(self) -> BlockTimes:
-        """The times that the worker took; ``overruns`` counts the late results."""
+        """Return the times that the worker took; ``overruns`` counts the late results."""
         return times_of(
             self._times[: self._shown], self._shown, self._total, self._longest, self._late
         )
 
 
 JOBS = "jobs~"
-"""The state that says which runs are under way."""
+"""Name of the state with the runs under way."""
 FIRST, SHOWN = 0, 1
 
 
 def _pending(name: str) -> str:
-    """The state that has the sampled values of an input."""
+    """Return the name of the state with the sampled values of an input."""
     return f"{name}~pending"
 
 
 def background_block_type(block_type: type[Block], background: Background) -> type[BackgroundBlock]:
-    """What stands for blocks of that type which work in the background."""
+    """Return the stand-in for blocks of that type which work in the background."""
     latency = background.latency
     body = {
         "__doc__": block_type.__doc__,

@@ -32,12 +32,12 @@ _JOB, _TICK, _DONE, _TIME, _LENGTH = 0, 1, 0, 1, 2
 
 
 def rounded(size: int) -> int:
-    """A number of bytes, rounded up to whole cache lines."""
+    """Round a number of bytes up to whole cache lines."""
     return -(-size // _LINE) * _LINE
 
 
 def record_size(arrays: Iterable[NDArray[Any]]) -> int:
-    """The bytes of a record of some arrays."""
+    """Return the size [bytes] of a record of some arrays."""
     return rounded(sum(-(-array.nbytes // 8) * 8 for array in arrays))
 
 
@@ -68,21 +68,23 @@ class JobMemory:
 
     @staticmethod
     def make(slots: int, inputs: int, results: int) -> int:
-        """A file descriptor of shared memory of this size."""
+        """Create shared memory of this size and return its file descriptor."""
         line = rounded(8 * _WORDS)
         record = 2 * line + rounded(LONGEST_TEXT) + rounded(inputs) + rounded(results)
         return nameless_memory((slots + 1) * record, "aloft-background")
 
     def inputs(self, slot: int, like: Sequence[NDArray[Any]]) -> list[NDArray[Any]]:
-        """The arrays of a record of inputs, of the types and shapes of ``like``."""
+        """Return the arrays of a record of inputs, of the types and shapes of ``like``."""
         return _split(self._inputs[slot], like)
 
     def results(self, slot: int, like: Sequence[NDArray[Any]]) -> list[NDArray[Any]]:
-        """The arrays of a record of results; that of slot ``slots`` is what the worker goes on from."""
+        """Return the arrays of a record of results; that of slot ``slots`` is what the worker goes
+        on from."""
         return _split(self._results[slot], like)
 
     def ask(self, slot: int, job: int, tick: int) -> None:
-        """Number the job whose inputs are in a slot. Numbers count from one and increase."""
+        """Post the job whose inputs are in a slot. The numbers of jobs count from one and
+        increase."""
         self._asked[slot, _TICK] = tick
         with self._fence:
             pass
@@ -94,7 +96,8 @@ class JobMemory:
             self._asked[slot, _JOB] = 0
 
     def next_job(self, last: int) -> tuple[int, int]:
-        """The first job after ``last`` that is asked for, and its slot; zeros if there is none."""
+        """Return the first job after ``last`` that was requested, and its slot; zeros if there is
+        none."""
         jobs = np.asarray(self._asked)[: self.slots, _JOB]
         later = jobs[jobs > last]
         if not later.size:
@@ -105,13 +108,13 @@ class JobMemory:
         return job, int(np.argmax(jobs == job))
 
     def is_asked(self, slot: int, job: int) -> bool:
-        """Whether the slot still holds that job."""
+        """Return whether the slot still holds that job."""
         with self._fence:
             pass
         return self._asked[slot, _JOB] == job
 
     def tick_of(self, slot: int) -> int:
-        """The tick in which the inputs were sampled."""
+        """Return the tick in which the inputs were sampled."""
         return int(self._asked[slot, _TICK])
 
     def finish(self, slot: int, job: int, nanoseconds: int, stop_reason: str = "") -> None:
@@ -125,7 +128,7 @@ class JobMemory:
         self._done[slot, _DONE] = job
 
     def is_finished(self, slot: int, job: int) -> bool:
-        """Whether the slot holds the result of the job."""
+        """Return whether the slot holds the result of the job."""
         if self._done[slot, _DONE] != job:
             return False
         with self._fence:
@@ -133,11 +136,11 @@ class JobMemory:
         return True
 
     def duration(self, slot: int) -> int:
-        """How long the job of a slot took [ns]."""
+        """Return the duration [ns] of the job of a slot."""
         return int(self._done[slot, _TIME])
 
     def stop_reason(self, slot: int) -> str:
-        """Why the job's block asks for the end of the run; empty if it does not."""
+        """Return the job's reason to end the run; empty if its block has none."""
         length = self._done[slot, _LENGTH]
         return bytes(self._texts[slot, :length]).decode(errors="ignore") if length else ""
 
@@ -152,7 +155,7 @@ def _split(record: NDArray[np.uint8], like: Sequence[NDArray[Any]]) -> list[NDAr
 
 
 def copies(targets: Iterable[NDArray[Any]], sources: Iterable[NDArray[Any]]) -> Copies:
-    """What ``copy`` takes, of arrays of equal types and shapes."""
+    """Prepare the arguments of ``copy`` for arrays of equal types and shapes."""
     pairs = zip(targets, sources, strict=True)
     return [(_octets(target), _octets(source)) for target, source in pairs if target.size]
 

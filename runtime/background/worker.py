@@ -4,9 +4,9 @@ The jobs lie in memory that both processes share; the worker does them in the or
 virtual time it is woken for each. In real time it looks by itself, every millisecond or less, because a
 control thread that wakes another may lose its processor to it.
 
-Through its standard input come first the ``WorkerTask`` and then messages, each of which says before
-which job it holds. When its input ends, it closes the block and answers with the block's metrics and
-warnings.
+Through its standard input come first the ``WorkerTask`` and then messages, each of which names the
+job before which it holds. When its input ends, it closes the block and answers with the block's
+metrics and warnings.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ WAKE, RESTORE, CHANGE = range(3)
 is not zero from the outputs there. From that job on, take over parameters, of which so many bytes of
 JSON follow."""
 BELL = b"."
-"""What the worker writes after each job, so that who waits for it wakes up."""
+"""Byte that the worker writes after each job, which wakes up a process that waits for it."""
 NICENESS = 5
-"""By how much the worker steps back behind the control thread, in real time."""
+"""Niceness of the worker in real time; the control thread takes precedence."""
 
 
 @dataclass(frozen=True)
 class WorkerTask:
-    """What a worker has to know.
+    """Task of a worker: its block, with all that is needed to make it.
 
     Attributes:
         use: the block, as a graph file names it.
@@ -211,7 +211,7 @@ class Worker:
             self._refused.append(describe(error))
 
     def answer(self) -> None:
-        """Say what the block says of the run."""
+        """Send the block's results and warnings of the run."""
         answer = {
             "metrics": {name: _plain(value) for name, value in self.block.metrics().items()},
             "warnings": [*self.block.warnings(), *self._refused],
@@ -227,13 +227,13 @@ def _plain(value: Any) -> Any:
 
 
 def views(block: Block, ports: Any, names: Any = None) -> list[Any]:
-    """The arrays of some of a block's ports, in the order of declaration."""
+    """Return the arrays of some of a block's ports, in the order of declaration."""
     wanted = ports if names is None else [name for name in ports if name in names]
     return [view for name in wanted for view in getattr(block, name).views().values()]
 
 
 def _find(use: str, context: Context) -> type[Block]:
-    """The block's class, seen from its own file, then from the graph's."""
+    """Find the block's class, as seen from its own file, then from the graph's."""
     try:
         return find_block(use, context.folder)
     except AloftError:
@@ -252,7 +252,7 @@ class _Inputs(Block):
 
 
 def _graph(kind: type[Block], params: Parameters, context: Context) -> CheckedGraph:
-    """The block, and a block with an output for each of its wired inputs."""
+    """Build a graph of the block and a source with an output for each of its wired inputs."""
     path, source = context.path, _source(context)
     outputs = {name: Output(kind.inputs[name].signal) for name in context.wired}
     body = {"__doc__": _Inputs.__doc__, **outputs}

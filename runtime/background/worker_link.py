@@ -109,11 +109,11 @@ class WorkerLink:
         return self._job
 
     def restore(self, *, with_outputs: bool) -> None:
-        """Let the worker go on from the last slot, with the jobs that are asked for after this."""
+        """Let the worker go on from the last slot, with the jobs that are requested after this."""
         self._send(RESTORE, int(with_outputs))
 
     def change(self, params: Parameters) -> None:
-        """Let the worker take over parameters, for the jobs that are asked for after this."""
+        """Change the worker's parameters, for the jobs that are requested after this."""
         text = parameter_text(params).encode()
         self._send(CHANGE, len(text), text)
 
@@ -144,12 +144,12 @@ class WorkerLink:
             raise self.death(slot)
 
     def death(self, slot: int) -> WorkerError:
-        """Why the worker has died."""
+        """Return the error of a worker that has died, with the cause."""
         self.has_failed = True
         return WorkerError(f"{self._process.failure()}, in the run of {self._sampled(slot)}")
 
     def hang(self, slot: int, seconds: float) -> WorkerError:
-        """That it does not come to the end of a job."""
+        """Return the error of a worker that does not finish a job."""
         self.has_failed = True
         return WorkerError(
             f"{self._process.name} hangs in the run of {self._sampled(slot)}: it did not finish it "

@@ -1,4 +1,4 @@
-"""What a diagram shows: blocks and boxes with their ports, and the wires between these.
+"""Content of a diagram: blocks and boxes with their ports, and the wires between these.
 
 A box stands for a sub-graph. An open one has a diagram of its own inside; a closed one is drawn like
 a block, with a port for everything that crosses its border.
@@ -26,7 +26,7 @@ class DiagramWire:
     truth: bool = False
     transition: str = ""
     wire_text: str = ""
-    """The source as the graph file says it, such as ``robot.joints.position[2]``."""
+    """Source as written in the graph file, such as ``robot.joints.position[2]``."""
 
 
 @dataclass
@@ -42,7 +42,7 @@ class DiagramNode:
     inputs: list[str] = field(default_factory=list)
     outputs: list[str] = field(default_factory=list)
     labels: dict[str, str] = field(default_factory=dict)
-    """What stands beside a port, where that is not its name."""
+    """Text beside a port, where it is not the port's name."""
     inside: Diagram | None = None
     is_box: bool = False
 
@@ -56,7 +56,7 @@ class Diagram:
 
 
 def diagram(graph: CheckedGraph, closed: Collection[str] = ()) -> Diagram:
-    """The diagram of a graph, in which the sub-graphs at the paths ``closed`` are closed."""
+    """Build the diagram of a graph, in which the sub-graphs at the paths ``closed`` are closed."""
     rows = [row for row in table(graph) if "~" not in row.path]
     machines = {spec.path: spec.machine for spec in graph.blocks}
     links = [
@@ -69,7 +69,7 @@ def diagram(graph: CheckedGraph, closed: Collection[str] = ()) -> Diagram:
 
 
 def subgraphs(graph: CheckedGraph) -> tuple[str, ...]:
-    """The paths of all sub-graphs, the outermost first."""
+    """Return the paths of all sub-graphs, the outermost first."""
     found: dict[str, None] = {}
     for spec in graph.blocks:
         if "~" not in spec.path:
@@ -94,7 +94,7 @@ def _level(
     machines: dict[str, str],
     closed: Collection[str],
 ) -> Diagram:
-    """The diagram of what lies below a path."""
+    """Build the diagram of the blocks and boxes below a path."""
     nodes: dict[str, DiagramNode] = {}
     inner: dict[str, list[BlockRow]] = {}
     for row in rows:
@@ -144,7 +144,7 @@ def _block(row: BlockRow, title: str, machine: str) -> DiagramNode:
 
 
 def _end(port: str, prefix: str, nodes: dict[str, DiagramNode], is_source: bool) -> str | None:
-    """The node of a level at which an end of a wire lies; its border if it lies outside."""
+    """Return the node of a level at which an end of a wire lies; its border if it lies outside."""
     block = port.rpartition(".")[0]
     if not block.startswith(prefix):
         return (INTO if is_source else OUT) if prefix else None
@@ -153,7 +153,8 @@ def _end(port: str, prefix: str, nodes: dict[str, DiagramNode], is_source: bool)
 
 
 def _port(node: DiagramNode, end: str, prefix: str, is_source: bool, source: str = "") -> str:
-    """The port of a node for an end of a wire; boxes and borders get one where it is missing."""
+    """Return the port of a node for an end of a wire; boxes and borders get one where it is
+    missing."""
     if not node.is_box and node.path not in (INTO, OUT):
         return end.rpartition(".")[2]
     ports = node.outputs if is_source else node.inputs

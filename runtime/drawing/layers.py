@@ -21,7 +21,7 @@ _ROUNDS = 2
 _BELOW = "<below>"
 """The place of the lanes that lead back."""
 FEW = 300
-"""With no more places in all the best order is sought, else a good one."""
+"""Largest number of places for which the best order is sought; beyond it, a good one."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class WirePassage:
     layer: int
 
 
-Place = str | WirePassage
+Slot = str | WirePassage
 """A node, by its path, or the passage of a net."""
 
 
@@ -40,16 +40,16 @@ Place = str | WirePassage
 class Layers:
     """The columns from left to right, with their places from top to bottom."""
 
-    columns: list[list[Place]]
+    columns: list[list[Slot]]
     layer: dict[str, int]
     forward: list[DiagramWire]
     back: list[DiagramWire]
-    links: dict[tuple[Place, Place], list[tuple[str, str]]] = field(default_factory=dict)
+    links: dict[tuple[Slot, Slot], list[tuple[str, str]]] = field(default_factory=dict)
     """Between neighbouring columns: the ports at both ends, empty for a passage."""
 
 
 def arrange(diagram: Diagram) -> Layers:
-    """The columns of a diagram, in an order that is the same for the same diagram.
+    """Arrange a diagram in columns, in an order that is the same for the same diagram.
 
     The ports of its blocks are put into the order in which their wires come and go.
     """
@@ -57,7 +57,7 @@ def arrange(diagram: Diagram) -> Layers:
     forward = [w for w in diagram.wires if rank[w.source[0]] < rank[w.target[0]]]
     back = [w for w in diagram.wires if rank[w.source[0]] >= rank[w.target[0]]]
     layer = _longest_paths(diagram, forward, rank)
-    columns: list[list[Place]] = [[] for _ in range(max(layer.values(), default=0) + 1)]
+    columns: list[list[Slot]] = [[] for _ in range(max(layer.values(), default=0) + 1)]
     for path in diagram.nodes:
         columns[layer[path]].append(path)
     layers = Layers(columns, layer, forward, back)
@@ -69,7 +69,7 @@ def arrange(diagram: Diagram) -> Layers:
 
 
 def _ranks(diagram: Diagram) -> dict[str, float]:
-    """Where a node stands in the order of execution.
+    """Return the rank of each node in the order of execution.
 
     A block whose outputs follow from its state writes before all others and reads after them; it stands
     where the fewest of its wires lead back.
@@ -102,7 +102,8 @@ def _ranks(diagram: Diagram) -> dict[str, float]:
 def _longest_paths(
     diagram: Diagram, forward: Sequence[DiagramWire], rank: dict[str, float]
 ) -> dict[str, int]:
-    """The column of every node: behind all its sources, and not further left than need be."""
+    """Return the column of every node: behind all its sources, and no further right than
+    necessary."""
     layer = dict.fromkeys(diagram.nodes, 0)
     sources: dict[str, list[str]] = {path: [] for path in diagram.nodes}
     targets: dict[str, list[str]] = {path: [] for path in diagram.nodes}
@@ -121,12 +122,12 @@ def _longest_paths(
 
 
 def _add_passages(layers: Layers) -> None:
-    """A place in every column that a net passes, shared by all its readers."""
+    """Add a place in every column that a net passes, shared by all its readers."""
     reach: dict[tuple[str, str], int] = {}
     for wire in layers.forward:
         reach[wire.source] = max(reach.get(wire.source, 0), layers.layer[wire.target[0]])
     for net, end in reach.items():
-        before: Place = net[0]
+        before: Slot = net[0]
         port = net[1]
         for number in range(layers.layer[net[0]] + 1, end):
             passage = WirePassage(net, number)
@@ -143,8 +144,8 @@ def _add_passages(layers: Layers) -> None:
             found.append(ends)
 
 
-End = tuple[Place, float]
-"""Where a net arrives: the place, and how far down in it."""
+End = tuple[Slot, float]
+"""End of a net: the place, and its share of the place's height from the top."""
 
 
 @dataclass
@@ -164,9 +165,9 @@ def _reduce_crossings(layers: Layers, diagram: Diagram) -> None:
     ports = {
         path: (_shares(node.inputs), _shares(node.outputs)) for path, node in diagram.nodes.items()
     }
-    before: dict[Place, list[End]] = {}
-    behind: dict[Place, list[End]] = {}
-    nets: dict[tuple[Place, str], _NetInGap] = {}
+    before: dict[Slot, list[End]] = {}
+    behind: dict[Slot, list[End]] = {}
+    nets: dict[tuple[Slot, str], _NetInGap] = {}
     gaps: list[list[_NetInGap]] = [[] for _ in layers.columns]
     for (a, b), links in layers.links.items():
         for out, into in links:
@@ -236,8 +237,8 @@ def _reduce_crossings(layers: Layers, diagram: Diagram) -> None:
             where.update({p: k for column in kept for k, p in enumerate(column)})
 
 
-def _all_pairs(gaps: Sequence[Sequence[_NetInGap]], where: dict[Place, int]) -> int:
-    """How often nets must cross in all gaps."""
+def _all_pairs(gaps: Sequence[Sequence[_NetInGap]], where: dict[Slot, int]) -> int:
+    """Count the unavoidable crossings of nets in all gaps."""
     return sum(
         _pair(one, other, where)
         for gap in gaps
@@ -248,7 +249,7 @@ def _all_pairs(gaps: Sequence[Sequence[_NetInGap]], where: dict[Place, int]) -> 
 
 def _sort_ports(layers: Layers, diagram: Diagram) -> None:
     """Put the ports of every block into the order of what they are wired to."""
-    where: dict[Place, int] = {p: k for column in layers.columns for k, p in enumerate(column)}
+    where: dict[Slot, int] = {p: k for column in layers.columns for k, p in enumerate(column)}
     far = float(len(where))
     ports = {p: (_shares(node.inputs), _shares(node.outputs)) for p, node in diagram.nodes.items()}
     found: dict[tuple[str, bool, str], list[float]] = {}
@@ -278,12 +279,12 @@ def _sort_ports(layers: Layers, diagram: Diagram) -> None:
 
 
 def _shares(ports: Sequence[str]) -> dict[str, float]:
-    """How far down in its block each port is."""
+    """Return the height of each port in its block, as a share from the top."""
     return {port: (k + 1) / (len(ports) + 1) for k, port in enumerate(ports)}
 
 
-def _crossings(gaps: Sequence[Sequence[_NetInGap]], where: dict[Place, int]) -> int:
-    """How many pairs of wires between neighbouring columns cross."""
+def _crossings(gaps: Sequence[Sequence[_NetInGap]], where: dict[Slot, int]) -> int:
+    """Count the crossing pairs of wires between neighbouring columns."""
     total = 0
     for gap in gaps:
         wires = sorted(
@@ -297,9 +298,9 @@ def _crossings(gaps: Sequence[Sequence[_NetInGap]], where: dict[Place, int]) -> 
     return total
 
 
-def _exchange(layers: Layers, gaps: Sequence[Sequence[_NetInGap]], where: dict[Place, int]) -> None:
+def _exchange(layers: Layers, gaps: Sequence[Sequence[_NetInGap]], where: dict[Slot, int]) -> None:
     """Move single places up and down in their columns while fewer nets cross."""
-    touching: dict[Place, tuple[list[_NetInGap], list[_NetInGap]]] = {
+    touching: dict[Slot, tuple[list[_NetInGap], list[_NetInGap]]] = {
         place: ([], []) for place in where
     }
     for gap in gaps:
@@ -308,7 +309,7 @@ def _exchange(layers: Layers, gaps: Sequence[Sequence[_NetInGap]], where: dict[P
             for place in dict.fromkeys(p for p, _ in net.ends):
                 touching[place][0].append(net)
 
-    def among(one: Place, other: Place) -> int:
+    def among(one: Slot, other: Slot) -> int:
         return sum(
             _pair(a, b, where)
             for side in (0, 1)
@@ -328,11 +329,11 @@ def _exchange(layers: Layers, gaps: Sequence[Sequence[_NetInGap]], where: dict[P
 
 
 def _move(
-    column: list[Place],
-    place: Place,
+    column: list[Slot],
+    place: Slot,
     step: int,
-    where: dict[Place, int],
-    among: Callable[[Place, Place], int],
+    where: dict[Slot, int],
+    among: Callable[[Slot, Slot], int],
 ) -> bool:
     """Move a place down (1) or up (-1) to where the fewest nets cross; whether that is elsewhere."""
 
@@ -356,8 +357,8 @@ def _move(
     return best != begin
 
 
-def _pair(one: _NetInGap, other: _NetInGap, where: dict[Place, int]) -> int:
-    """How often two nets must cross in a gap."""
+def _pair(one: _NetInGap, other: _NetInGap, where: dict[Slot, int]) -> int:
+    """Count the unavoidable crossings of two nets in a gap."""
     if where[one.start[0]] + one.start[1] > where[other.start[0]] + other.start[1]:
         one, other = other, one
     upper = [where[p] + s for p, s in one.ends]

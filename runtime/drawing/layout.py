@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from .diagram import INTO, OUT, Diagram, DiagramNode, DiagramWire
-from .layers import FEW, Layers, Place, WirePassage, arrange
+from .layers import FEW, Layers, Slot, WirePassage, arrange
 from .tracks import LANE, STRAIGHT, TRACK, Hop, Net, assign_tracks
 
 ROW = 18.0
-"""From one port to the next."""
+"""Distance from one port to the next."""
 HEAD = 42.0
 """Height of a block's title and of what it uses."""
 FOOT = 9.0
@@ -44,7 +44,8 @@ class Box:
     inside: Drawing | None = None
 
     def port(self, name: str, outputs: bool) -> float:
-        """The height of a port above the page's lower edge, that is, its y relative to the box."""
+        """Return the height of a port above the page's lower edge, that is, its y relative to the
+        box."""
         ports = self.node.outputs if outputs else self.node.inputs
         if self.inside is not None:
             border = self.inside.boxes[INTO if outputs is False else OUT]
@@ -60,7 +61,7 @@ class Line:
     points: tuple[tuple[float, float], ...]
     wire: DiagramWire
     ends: bool = True
-    """Whether it ends at a block's input, with an arrow head."""
+    """True if it ends at a block's input, with an arrow head."""
 
 
 @dataclass
@@ -76,7 +77,7 @@ class Drawing:
 
 
 def note_of(wire: DiagramWire) -> str:
-    """What stands on a wire that is not a plain one: delay, change of rate, what is selected."""
+    """Return the label of a wire that is not a plain one: delay, change of rate, selection."""
     notes = [f"z⁻{str(wire.delay).translate(_RAISED)}"] if wire.delay else []
     notes += [wire.transition] if wire.transition else []
     port = wire.source[1].rpartition(".")[2]
@@ -164,7 +165,7 @@ class Router:
             self.lanes.append((source + 1, target, net, wires))
 
     def _x(self, gap: int, track: int) -> float:
-        """The place of a vertical line."""
+        """Return the x of a vertical line."""
         left = self.columns[gap - 1][1] if gap else 0.0
         return left + 14.0 + TRACK * track
 
@@ -182,7 +183,7 @@ class Router:
                 drawing.dots.append((start, y, wires[0]))
 
     def _draw(self, number: int, hop: Hop, drawing: Drawing) -> None:
-        """The lines of a net in a gap."""
+        """Draw the lines of a net in a gap."""
         left = self.columns[number - 1] if number else (0.0, 0.0)
         x = self._x(number, hop.track)
         first, last = hop.span(self.floor)
@@ -214,28 +215,31 @@ class Router:
                 drawing.dots.append((x, y, hop.wire))
 
     def ends(self, wire: DiagramWire | None) -> bool:
-        """Whether a branch ends at a block, and not at a border behind which it goes on."""
+        """Return whether a branch ends at a block, and not at a border behind which it goes on."""
         if wire is None:
             return False
         box = self.boxes[wire.target[0]]
         return wire.target[0] != OUT and box.inside is None
 
     def _edge(self, net: Net, column: int, edges: tuple[float, float]) -> float:
-        """Where a net leaves a column: at its block, or at the column's left edge if it passes."""
+        """Return the x where a net leaves a column: at its block, or at the column's left edge if
+        it passes."""
         box = self.boxes[net[0]]
         if self.layers.layer[net[0]] == column:
             return box.x + box.width
         return edges[0] - 2.0
 
     def _end(self, number: int, hop: Hop, wire: DiagramWire | None) -> float:
-        """Where a branch ends: at a block, or at the edge of the column that it passes."""
+        """Return the x where a branch ends: at a block, or at the edge of the column that it
+        passes."""
         if wire is None:
             return self.columns[number][0] - 2.0
         return self.boxes[wire.target[0]].x
 
 
 def column_gaps(router: Router) -> list[float]:
-    """The width of every gap: before the first column, between columns, and behind the last."""
+    """Return the width of every gap: before the first column, between columns, and behind the
+    last."""
     widths = []
     for number, gap in enumerate(router.gaps):
         count = 1 + max((hop.track for hop in gap.values() if not hop.is_straight()), default=-1)
@@ -260,7 +264,7 @@ _ITERATIONS_OF_MANY = 12
 
 
 def draw(diagram: Diagram) -> Drawing:
-    """The drawing of a diagram, with the drawings of open boxes inside."""
+    """Draw a diagram, with the drawings of open boxes inside."""
     boxes: dict[str, Box] = {}
     for path, node in diagram.nodes.items():
         if node.inside is None:
@@ -294,15 +298,15 @@ def draw(diagram: Diagram) -> Drawing:
     return drawing
 
 
-def _heights(layers: Layers, boxes: dict[str, Box]) -> dict[Place, float]:
-    """The y of the upper edge of every node, and of every passage."""
-    y: dict[Place, float] = {}
+def _heights(layers: Layers, boxes: dict[str, Box]) -> dict[Slot, float]:
+    """Return the y of the upper edge of every node, and of every passage."""
+    y: dict[Slot, float] = {}
     for column in layers.columns:
         top = 0.0
         for place in column:
             y[place] = top
             top += _height(place, boxes) + (_PASS_GAP if isinstance(place, WirePassage) else _GAP)
-    links: dict[Place, list[tuple[Place, float, float, float]]] = {}
+    links: dict[Slot, list[tuple[Slot, float, float, float]]] = {}
     for (a, b), ends in layers.links.items():
         for out, into in ends:
             weight = (1.0, 4.0, 16.0)[isinstance(a, WirePassage) + isinstance(b, WirePassage)]
@@ -325,7 +329,7 @@ def _heights(layers: Layers, boxes: dict[str, Box]) -> dict[Place, float]:
     return {place: round(value - least + _MARGIN) for place, value in y.items()}
 
 
-def _straighten(layers: Layers, y: dict[Place, float], boxes: dict[str, Box]) -> None:
+def _straighten(layers: Layers, y: dict[Slot, float], boxes: dict[str, Box]) -> None:
     """Take small steps out of the lines that pass columns, where there is room."""
     before = {
         b: (a, ends[0][0]) for (a, b), ends in layers.links.items() if isinstance(b, WirePassage)
@@ -346,14 +350,14 @@ def _straighten(layers: Layers, y: dict[Place, float], boxes: dict[str, Box]) ->
                 y[place] = wish
 
 
-def _height(place: Place, boxes: dict[str, Box]) -> float:
+def _height(place: Slot, boxes: dict[str, Box]) -> float:
     return boxes[place].height if isinstance(place, str) else 0.0
 
 
 def _settle(
-    column: list[Place],
+    column: list[Slot],
     wishes: list[tuple[float, float]],
-    y: dict[Place, float],
+    y: dict[Slot, float],
     boxes: dict[str, Box],
 ) -> None:
     """Move the places of a column as near to their wishes as their order and distances allow.

@@ -142,7 +142,7 @@ fit();
 
 @dataclass(frozen=True)
 class PageAddition:
-    """What a page has besides the diagram: data, controls, and the style and script for them."""
+    """Addition of a page to the diagram: data, controls, and the style and script for them."""
 
     name: str
     data: Mapping[str, Any]
@@ -157,7 +157,7 @@ def page(
     values: Values | None = None,
     addition: PageAddition | None = None,
 ) -> str:
-    """The page's text. It asks no other machine for anything.
+    """Return the page's text. It makes no request to any other machine.
 
     With ``values`` it has a slider over the ticks of a run, and shows what a chosen block reads and
     writes there, and the time it took. The script of an ``addition`` runs after the page's own.
@@ -196,8 +196,8 @@ def page(
 
 
 def policy(addition: str = "") -> str:
-    """The Content-Security-Policy of the page: its own script and style, that of an addition, and
-    nothing else."""
+    """Return the Content-Security-Policy of the page: its own script and style, that of an
+    addition, and nothing else."""
     digests = [
         base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
         for script in (_SCRIPT, addition)
@@ -214,7 +214,7 @@ def policy(addition: str = "") -> str:
 def page_server(
     graph: CheckedGraph, port: int = 0, values: Values | None = None
 ) -> ThreadingHTTPServer:
-    """The server, which listens on the loopback address but does not serve yet.
+    """Make the server, which listens on the loopback address but does not serve yet.
 
     With ``values`` the page shows them, and asks for those of a tick by ``/at?tick=``.
 
@@ -246,7 +246,7 @@ def page_server(
 
 
 def details(graph: CheckedGraph) -> dict[str, dict[str, Any]]:
-    """The details of every block that a user wrote, by path, as plain data."""
+    """Return the details of every block that a user wrote, by path, as plain data."""
     specs = {spec.path: spec for spec in graph.blocks}
     return {row.path: _of(row, specs[row.path]) for row in table(graph) if "~" not in row.path}
 
@@ -275,7 +275,7 @@ def _of(row: BlockRow, spec: BlockSpec) -> dict[str, Any]:
 
 
 def _fields(port: PortReference, spec: BlockSpec) -> str:
-    """The fields of an output with what they carry in this graph."""
+    """Return the fields of an output with what they carry in this graph."""
     found = []
     for field in port.fields:
         quantity = spec.quantities.get(f"{port.name}.{field.name}")
@@ -300,14 +300,14 @@ class Values(Protocol):
     period: float
     """The duration of a tick [s]."""
     times: Mapping[str, str]
-    """What there is to say of the time that a block took, by the block's path."""
+    """Text on the time that a block took, by the block's path."""
 
     def at(self, tick: int) -> Mapping[str, str]:
         """Every field of every output at a tick, by ``block.port.field``."""
 
 
 def shown(value: NDArray[Any], unit: str = "") -> str:
-    """The numbers of a field as a short text."""
+    """Format the numbers of a field as a short text."""
     flat = np.ravel(value)
     texts = [f"{x:.6g}" if flat.dtype.kind == "f" else str(x) for x in flat[:MOST].tolist()]
     text = ", ".join(texts) if flat.size != 1 else texts[0]
@@ -327,7 +327,7 @@ class LoopbackHandler(BaseHTTPRequestHandler):
     content_policy = "default-src 'none'"
 
     def is_ours(self) -> bool:
-        """Whether the request was made to this machine; if not, it is refused.
+        """Return whether the request was made to this machine; refuse it if not.
 
         A page of another site whose name was made to point here (DNS rebinding) still says its name
         in ``Host``.

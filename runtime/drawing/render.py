@@ -47,33 +47,33 @@ RATES_DARK = ("#1e2b3f", "#3a2a1a", "#1c3325", "#2f2340", "#35301a", "#183236")
 
 @dataclass(frozen=True)
 class Style:
-    """Which colour each source, each rate and each machine has in one drawing."""
+    """Colours of each source, each rate and each machine in one drawing."""
 
     sources: dict[str, int]
     rates: dict[float, int]
     machines: dict[str, int]
 
     def wire(self, wire: DiagramWire) -> int:
-        """The number of a wire's colour."""
+        """Return the number of a wire's colour."""
         return self.sources.get(owner(wire.source), 0) % len(WIRES_LIGHT)
 
     def block(self, node: DiagramNode) -> int:
-        """The number of a block's colour."""
+        """Return the number of a block's colour."""
         return self.rates.get(node.rate_hz, 0) % len(RATES_LIGHT)
 
 
 def owner(end: tuple[str, str]) -> str:
-    """The block that writes; a border's port is named by it."""
+    """Return the block that writes; a border's port is named by it."""
     return port_of(end).rpartition(".")[0]
 
 
 def port_of(end: tuple[str, str]) -> str:
-    """The output ``block.port`` at an end of a wire that carries it."""
+    """Return the output ``block.port`` at an end of a wire that carries it."""
     return end[1] if "." in end[1] else f"{end[0]}.{end[1]}"
 
 
 def style_of(diagram: Diagram) -> Style:
-    """The colours of a diagram, also of what is inside of its boxes."""
+    """Choose the colours of a diagram, and of the content of its boxes."""
     nodes = [node for node in _nodes(diagram) if node.title and not node.is_box]
     rates = sorted(dict.fromkeys(node.rate_hz for node in nodes), reverse=True)
     machines = dict.fromkeys(node.machine for node in nodes if node.machine)
@@ -97,7 +97,7 @@ def hertz(rate: float) -> str:
 
 
 def legend(diagram: Diagram, style: Style) -> list[tuple[str, str]]:
-    """What the drawing has, as (kind, text), where the kind says what the sample looks like."""
+    """Return the legend's entries as (kind, text), where the kind chooses the sample."""
     wires = list(_wires(diagram))
     found = [(f"rate{number}", hertz(rate)) for rate, number in style.rates.items()]
     if any(node.moore for node in _nodes(diagram)):
@@ -124,7 +124,7 @@ FONT = "'DejaVu Sans', Verdana, Arial, sans-serif"
 
 
 def svg(drawing: Drawing, title: str = "") -> str:
-    """The drawing as the text of an SVG file of its own."""
+    """Render the drawing as the text of an SVG file of its own."""
     style = style_of(drawing.diagram)
     samples = list(_legend(drawing, style))
     width = max(drawing.width, samples[-1][1] if samples else 0.0) + 4
@@ -276,7 +276,7 @@ def _frame(box: Box, style: Style) -> Iterator[str]:
 
 
 def _legend(drawing: Drawing, style: Style) -> Iterator[tuple[str, float]]:
-    """Samples with their texts below the drawing, each with the x at which it ends."""
+    """Yield samples with their texts below the drawing, each with the x at which it ends."""
     x, y = 16.0, drawing.height + 14
     for kind, text in legend(drawing.diagram, style):
         if kind.startswith("rate") and kind != "rates":

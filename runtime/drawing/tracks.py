@@ -9,15 +9,15 @@ from dataclasses import dataclass, field
 from .diagram import DiagramWire
 
 TRACK = 6.5
-"""From one vertical line to the next."""
+"""Distance from one vertical line to the next."""
 LANE = 9.0
-"""From one line that leads back to the next."""
+"""Distance from one line that leads back to the next."""
 STRAIGHT = 0.5
 Net = tuple[str, str]
 _ROOM = 5.0
 """Between two lines on one track."""
 _FEW = 80
-"""In a gap of no more lines every order of two is weighed."""
+"""Largest number of lines in a gap for which both orders of every pair are compared."""
 _PASSES = 6
 
 
@@ -37,7 +37,7 @@ class Hop:
     track: int = 0
 
     def span(self, floor: float) -> tuple[float, float]:
-        """The least and the greatest height."""
+        """Return the least and the greatest height."""
         heights = [y for y, _ in self.ends]
         heights += [] if self.starts is None else [self.starts]
         for lane in (self.goes_to, self.comes_from):
@@ -45,7 +45,7 @@ class Hop:
         return min(heights), max(heights)
 
     def is_straight(self) -> bool:
-        """Whether it needs no vertical line."""
+        """Return whether it needs no vertical line."""
         if self.goes_to is not None or self.comes_from is not None or self.starts is None:
             return False
         return all(abs(y - self.starts) < STRAIGHT for y, _ in self.ends)
@@ -62,7 +62,7 @@ class _Vertical:
     right: tuple[float, ...]
 
     def crossed(self, heights: Sequence[float]) -> int:
-        """How many horizontal lines at these heights, in order, cross it."""
+        """Count the horizontal lines at these heights, in order, that cross it."""
         return max(0, bisect_left(heights, self.last) - bisect_right(heights, self.first))
 
 
@@ -75,7 +75,7 @@ def _vertical(hop: Hop, floor: float) -> _Vertical:
 
 
 def _cost(one: _Vertical, other: _Vertical) -> int:
-    """How many lines cross if ``one`` stands left of ``other``."""
+    """Count the crossings of lines if ``one`` stands left of ``other``."""
     if one.last < other.first or other.last < one.first:
         return 0
     return one.crossed(other.left) + other.crossed(one.right)
@@ -134,5 +134,6 @@ def _fits(line: _Vertical, track: Sequence[_Vertical]) -> bool:
 
 
 def _may_stand(line: _Vertical, track: Sequence[_Vertical]) -> bool:
-    """Whether a line may stand on a track or left of it: nothing there has to be left of the line."""
+    """Return whether a line may stand on a track or left of it: none there must be left of the
+    line."""
     return all(_cost(line, other) <= _cost(other, line) and _fits(line, [other]) for other in track)

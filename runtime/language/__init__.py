@@ -1,1 +1,1 @@
-"""What a block is: signals, units, parameters, ports, and the stages a graph goes through."""
+"""Language of blocks: signals, units, parameters, ports, and the stages of a graph."""

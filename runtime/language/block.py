@@ -48,7 +48,7 @@ S = TypeVar("S", bound=Signal)
 Metric = float | int | bool | str
 """The type of one named result of a run."""
 Need = Literal["robot", "floating base", "feet", "imu", "switches"]
-"""What a block may need of the graph's robot."""
+"""Property that a block may need of the graph's robot."""
 
 
 class Port(Generic[S]):
@@ -101,7 +101,7 @@ class Input(Port[S]):
 
     @property
     def optional(self) -> bool:
-        """Whether the input may stay unwired."""
+        """True if the input may stay unwired."""
         return self.default is not None
 
 
@@ -131,9 +131,9 @@ class State(Port[S]):
 class UnmetRequirement:
     """Something about the graph's robot or a parameter that a block cannot work with.
 
-    ``message`` says what is wrong. ``parameter`` is the parameter concerned, if any, as ``name`` or
-    ``name.key``. ``nearest`` holds legal names that resemble the one found. ``fix`` is the text to
-    write instead.
+    ``message`` describes the problem. ``parameter`` is the parameter concerned, if any, as ``name``
+    or ``name.key``. ``nearest`` holds legal names that resemble the one found. ``fix`` is the text
+    to write instead.
     """
 
     message: str
@@ -155,9 +155,10 @@ class Block:
 
     Params: ClassVar[type[Parameters]] = Parameters
     Constants: ClassVar[type[Signal] | None] = None
-    """What follows from the parameters and the robot: ``prepare`` writes it into ``constants``."""
+    """Values that follow from the parameters and the robot: ``prepare`` writes them into
+    ``constants``."""
     Scratch: ClassVar[type[Signal] | None] = None
-    """Room for what a step computes on its way, in ``scratch``. No value lasts until the next step."""
+    """Scratch memory of one step, in ``scratch``. No value lasts until the next step."""
     named_steps: ClassVar[Mapping[str, Any]] = {}
     """The steps that name what they take, by the name of the method; see ``steps``."""
     overridden_steps: ClassVar[frozenset[str]] = frozenset()
@@ -167,38 +168,40 @@ class Block:
     states: ClassVar[Mapping[str, State[Any]]] = {}
 
     outside: ClassVar[Literal["no", "simulated", "real"]] = "no"
-    """Whether outputs come from outside the graph. A simulator gives the same outputs again when it
-    is run again; the real world (a robot, another machine) does not, so a replay takes its outputs
-    from the recording."""
+    """Origin of the outputs: the graph alone, a simulator or the real world. A simulator gives the
+    same outputs again when it is run again; the real world (a robot, another machine) does not, so
+    a replay takes its outputs from the recording."""
 
     delay_runs: ClassVar[int] = 1
     """After how many runs the outputs of a Moore block depend on what it reads."""
 
     waits_for_others: bool = False
-    """Whether a call waits for another process, with a limit of its own. Then the watchdog, which
+    """True if a call waits for another process, with a limit of its own. Then the watchdog, which
     ends the run when a call takes longer than ``clock.hangs_after``, does not watch the block."""
 
     array_allocations: ClassVar[int] = 0
-    """How many arrays a tick may allocate. It is zero unless a library leaves no choice; then the
-    class says in ``allocation_reason`` which library that is."""
+    """Number of arrays that a tick may allocate. It is zero unless a library leaves no choice; then
+    ``allocation_reason`` names that library."""
     allocation_reason: ClassVar[str] = ""
 
     needs: ClassVar[tuple[Need, ...]] = ()
-    """What the graph's robot must have for this block; the load report names what is missing."""
+    """Properties that the graph's robot must have for this block; the load report names what is
+    missing."""
 
     params: Parameters
     context: Context
     constants: Any
     scratch: Any
     kernel_calls: Sequence[KernelCall | PythonCall] = ()
-    """What ``step`` or ``emit`` consists of, where that is nothing but calls."""
+    """Calls that ``step`` or ``emit`` consists of, where it is nothing but calls."""
     update_calls: Sequence[KernelCall | PythonCall] = ()
-    """What ``update`` consists of, likewise."""
+    """Calls that ``update`` consists of, likewise."""
     event: NDArray[np.int64] | None = None
-    """Not zero where the last step asks for ``on_event``, (1,); none where it never does."""
+    """Request of the last step for ``on_event``, (1,): not zero if so; ``None`` where it never
+    does."""
 
     event_calls: Sequence[KernelCall] = ()
-    """What a library without Python does in the place of ``on_event``, where there is something."""
+    """Calls that a library without Python makes in place of ``on_event``, if there are any."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -220,7 +223,7 @@ class Block:
 
     @classmethod
     def is_moore(cls) -> bool:
-        """Whether outputs follow from state alone (``emit`` and ``update``).
+        """Return whether outputs follow from state alone (``emit`` and ``update``).
 
         Raises:
             DeclarationError: the class defines neither ``step`` nor ``emit`` and ``update``, or
@@ -254,7 +257,7 @@ class Block:
         robot: RobotDescription | None = None,
         graph_folder: Path | None = None,
     ) -> type[Block]:
-        """The class whose ports are those that the parameters, or the graph's robot, ask for; by default
+        """Return the class whose ports are those for these parameters, or this robot; by default
         the class itself.
 
         Another class has the name of this one. Files that parameters name are relative to
@@ -264,7 +267,7 @@ class Block:
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """What the block needs of its parameters, robot and graph and does not have.
+        """Return the requirements that parameters, robot and graph do not meet.
 
         Loading reports it. ``context`` is the one that the block will be constructed with: it has
         the robot, the period of the block, the names of its wired inputs, and the folder to which
@@ -274,24 +277,25 @@ class Block:
 
     @classmethod
     def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
-        """What follows from this block's parameters for other blocks, as plain data by name.
+        """Return the values that follow from the parameters for other blocks, as plain data by
+        name.
 
-        A graph writes ``parameter: {from: block.name}`` to use it, so that nothing is said twice;
-        ``name`` may also be a parameter of the block. Loading puts the value in its place.
-        A ``UnmetRequirement`` in place of a value says why there is none; it is reported where a graph uses
-        it. ``context`` is as for ``requires``, but has no dimensions and no wired inputs.
-        What this raises should be an unmet requirement of ``requires`` as well.
+        A graph writes ``parameter: {from: block.name}`` to use it, so that nothing is declared
+        twice; ``name`` may also be a parameter of the block. Loading puts the value in its place.
+        An ``UnmetRequirement`` in place of a value is the reason why there is none, reported where
+        a graph uses it. ``context`` is as for ``requires``, but has no dimensions and no wired
+        inputs. What this raises should be an unmet requirement of ``requires`` as well.
         """
         return {}
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """The units and frames of outputs whose fields are declared as ``inferred``.
+        """Return the units and frames of outputs whose fields are declared as ``inferred``.
 
         ``inputs`` has those of the inputs. A gain, for instance, answers ``{"y": u.times(unit)}``
-        with ``u = inputs["u"]``, and ``{"y": None}`` while ``u`` is not known. What inputs must have
-        in common is said by ``inputs.alike("a", "b")``. Without this method such an output has a
-        unit that is not checked, which ``aloft check`` says.
+        with ``u = inputs["u"]``, and ``{"y": None}`` while ``u`` is not known. ``inputs.alike("a",
+        "b")`` requires that inputs agree. Without this method such an output has a unit that is not
+        checked, which ``aloft check`` reports.
         """
         return {}
 
@@ -308,7 +312,7 @@ class Block:
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """The parameters for the conformance suite: at least those that have no default."""
+        """Return the parameters for the conformance suite: at least those that have no default."""
         return {}
 
     @classmethod
@@ -389,18 +393,18 @@ class Block:
         """After a restore: read back from the declared state what ``save_state`` wrote there."""
 
     def state_elements(self) -> Mapping[str, Sequence[StateElements]]:
-        """What the elements are of state fields that mix quantities, in order, by ``state.field``."""
+        """Return the elements of state fields that mix quantities, in order, by ``state.field``."""
         return {}
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The block's results at the end of a run, with units in their names."""
+        """Return the block's results at the end of a run, with units in their names."""
         return {}
 
     def warnings(self) -> Sequence[str]:
         """Warnings to those who read the run's results, such as of a check that was waived.
 
-        Called when every block has started, and again when the run is over; what is said then for
-        the first time is added.
+        Called when every block has started, and again when the run is over; warnings that are new
+        then are added.
         """
         return ()
 

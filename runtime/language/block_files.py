@@ -11,7 +11,7 @@ from pathlib import Path
 _PORTS = ("Input", "Output")
 _MACHINE = ("step", "emit")
 _MOST_FILES = 300
-"""How many files of a user's folder are read at most in order to propose names."""
+"""Largest number of files of a user's folder that are read in order to propose names."""
 
 
 @dataclass(frozen=True)
@@ -22,15 +22,15 @@ class WrittenClass:
     bases: tuple[str, ...]
     """The base classes, each by the last part of its name: ``Block`` for ``aloft.Block``."""
     has_ports: bool
-    """Whether it declares a port, or says by ``specialize`` which ports it has."""
+    """True if it declares a port, or defines ``specialize``, which may give it some."""
     has_machine: bool
-    """Whether it defines ``step`` or ``emit``."""
+    """True if it defines ``step`` or ``emit``."""
     is_abstract: bool
-    """Whether it says so: by ``ABC`` among its bases, or by an abstract method."""
+    """True if it is declared abstract: by ``ABC`` among its bases, or by an abstract method."""
 
 
 def classes_in(path: Path) -> tuple[WrittenClass, ...]:
-    """The classes at the top level of a file; none if it cannot be read or parsed."""
+    """Return the classes at the top level of a file; none if it cannot be read or parsed."""
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
         if "class " not in text:
@@ -42,7 +42,7 @@ def classes_in(path: Path) -> tuple[WrittenClass, ...]:
 
 
 def blocks_in_packages(root: Path, packages: Iterable[str]) -> Mapping[str, Path]:
-    """The blocks that graphs can use as ``package.Class``, with their files, sorted by name.
+    """Return the blocks that graphs can use as ``package.Class``, with their files, sorted by name.
 
     A class is a block if it derives from ``Block`` or ``KernelBlock``, also through other classes.
     It can be used if it has or inherits a port and one of the methods ``step`` and ``emit``, it is
@@ -95,7 +95,8 @@ def files_of(folder: Path) -> tuple[Path, ...]:
 
 
 def _some_files(folder: Path) -> Iterator[Path]:
-    """The Python files in a folder and in the folders that lie in it, up to ``_MOST_FILES``."""
+    """Yield the Python files in a folder and in the folders that lie in it, up to
+    ``_MOST_FILES``."""
     count = 0
     for pattern in ("*.py", "*/*.py"):
         for path in sorted(folder.glob(pattern)):

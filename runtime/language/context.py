@@ -1,4 +1,4 @@
-"""What the runtime tells a block about the run and the graph it is in."""
+"""Context of a block: the run and the graph it is in."""
 
 from __future__ import annotations
 
@@ -26,10 +26,11 @@ class Clock:
         self.stopped_by = ""
         """The path of the block that asked for the end of the run."""
         self.began = 0
-        """When the present tick began, by the run's source of time [ns]; zero if ticks are not
-        timed."""
+        """Time at which the present tick began, by the run's source of time [ns]; zero if ticks are
+        not timed."""
         self.command_limit = 0.0
-        """How long the links that bring commands may be silent [s]; zero where none is watched."""
+        """Longest silence allowed to the links that bring commands [s]; zero where none is
+        watched."""
 
     @property
     def tick(self) -> int:
@@ -41,14 +42,14 @@ class Clock:
         self.present[0] = tick
 
     def commands_heard(self) -> int:
-        """When the most silent link that brings commands last brought one, by the monotonic clock
-        [ns]; zero where no such link is watched."""
+        """Return the time of the last commands on the most silent link that brings them, by the
+        monotonic clock [ns]; zero where no such link is watched."""
         return 0
 
 
 @dataclass(frozen=True)
 class Context:
-    """What the runtime tells a block about the graph it is in.
+    """Context of a block in its graph.
 
     ``period_ticks`` and ``offset_ticks`` say in which base ticks the block runs. ``dimensions``
     holds the sizes of all dimensions that the block can use, and ``wired`` names its wired inputs.
@@ -56,7 +57,7 @@ class Context:
     names are relative to it. ``graph_folder`` is the folder of the graph that was loaded, beside
     which users keep their modules.
 
-    While a block is asked for its ``exported_values``, and only then, ``graph`` has the entry of every block
+    During ``exported_values``, and only then, ``graph`` has the entry of every block
     in the flattened graph, by its path: ``use``, ``with``, ``in`` and what else it has.
     """
 

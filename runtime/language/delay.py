@@ -82,12 +82,13 @@ class WireDelay(Block):
 
 
 def octets(values: NDArray[Any], rows: int) -> Octets:
-    """A view of the bytes of an array in so many rows, so that one kernel serves every dtype."""
+    """Return a view of the bytes of an array in so many rows, so that one kernel serves every
+    dtype."""
     return values.reshape(rows, -1).view(np.uint8)
 
 
 def copy_call(source: NDArray[Any], target: NDArray[Any]) -> KernelCall:
-    """The call that copies an array to another of the same dtype and size."""
+    """Return the call that copies an array to another of the same dtype and size."""
     return KernelCall(read_entry, octets(source, 1), np.zeros((), np.int64), octets(target, 1))
 
 
@@ -118,7 +119,8 @@ _TYPES: dict[tuple[type[Signal], int], type[WireDelay]] = {}
 
 
 def delay_block_type(signal: type[Signal], k: int) -> type[WireDelay]:
-    """The block type that delays ``signal`` by ``k`` >= 1 runs: input ``u``, output ``y``."""
+    """Return the block type that delays ``signal`` by ``k`` >= 1 runs: input ``u``, output
+    ``y``."""
     if k < 1:
         raise ValueError(f"a delay is at least 1 run, not {k}")
     if (signal, k) in _TYPES:
@@ -129,7 +131,7 @@ def delay_block_type(signal: type[Signal], k: int) -> type[WireDelay]:
         (WireDelay,),
         {
             "__doc__": WireDelay.__doc__,
-            "u": Input(signal, text="what is delayed"),
+            "u": Input(signal, text="the signal to delay"),
             "y": Output(signal, text=f"the input {k} runs ago"),
             "past": State(past, text="the last inputs"),
             "delay_runs": k,
@@ -140,7 +142,7 @@ def delay_block_type(signal: type[Signal], k: int) -> type[WireDelay]:
 
 
 def ring_signal(signal: type[Signal], k: int) -> type[Signal]:
-    """A signal with room for ``k`` values of every field of ``signal``."""
+    """Return a signal that holds ``k`` values of every field of ``signal``."""
     entries = {
         name: Field(
             (k, *field.shape), dtype=field.dtype_name, frame=field.frame, text=field.text,

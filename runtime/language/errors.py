@@ -8,7 +8,7 @@ from typing import Any
 
 
 class ExitCode(IntEnum):
-    """What the process returns to the shell."""
+    """Exit code of the process."""
 
     SUCCESS = 0
     """The graph ran and its own criteria hold."""
@@ -39,7 +39,7 @@ class DeclarationError(AloftError, TypeError):
 
 
 class UnknownBlockError(AloftError, LookupError):
-    """No block has that name; the message names the nearest ones."""
+    """There is no block of that name; the message lists the nearest names."""
 
 
 class BlockError(AloftError):
@@ -74,13 +74,13 @@ class RunError(AloftError):
         self.block = block
         self.tick = tick
         self.record_tick = False
-        """Whether the tick is to be recorded all the same: its values are the reason."""
+        """True if the tick is to be recorded all the same: its values are the reason."""
         self.where = ""
         """``file:line`` of the statement that raised what ended the run, where that is known."""
         self.traceback = ""
         """The whole traceback of what ended the run, as Python prints it."""
 
     def to_json(self) -> dict[str, Any]:
-        """The error as plain data."""
+        """Return the error as plain data."""
         names = ("block", "tick", "where", "traceback")
         return {"message": str(self), **{name: getattr(self, name) for name in names}}

@@ -30,7 +30,7 @@ class InputRead:
 
 
 def inputs_read_by_emit(block_type: type[Block]) -> tuple[InputRead, ...]:
-    """The inputs that ``emit``, or a method or property it uses, reads as ``self.<input>``.
+    """Return the inputs that ``emit``, or a method or property it uses, reads as ``self.<input>``.
 
     Only a direct access is found: not an input that ``setup`` keeps under another name, nor one
     read by a function that takes the block as an argument. The result is empty for a Mealy block,
@@ -44,7 +44,7 @@ def inputs_read_by_emit(block_type: type[Block]) -> tuple[InputRead, ...]:
 
 
 def _look(block_type: type[Block]) -> tuple[InputRead, ...]:
-    """The inputs that ``emit`` and all that it uses read, the first place of each."""
+    """Return the inputs that ``emit`` and all that it uses read, the first place of each."""
     found: dict[str, InputRead] = {}
     seen: set[FunctionType] = set()
     waiting = [*_functions(block_type, "emit")]
@@ -65,7 +65,8 @@ def _look(block_type: type[Block]) -> tuple[InputRead, ...]:
 
 
 def _functions(block_type: type[Block], name: str) -> Iterator[FunctionType]:
-    """The functions that ``self.<name>`` may call, with those of base classes for ``super()``."""
+    """Yield the functions that ``self.<name>`` may call, with those of base classes for
+    ``super()``."""
     for owner in block_type.__mro__:
         if owner is Block or not issubclass(owner, Block):
             continue
@@ -87,7 +88,7 @@ def _all_names(function: FunctionType) -> Iterator[str]:
 
 
 def _own_attributes(function: FunctionType) -> Iterator[tuple[str, int]]:
-    """The attributes that a method reads of its first argument, with their lines."""
+    """Yield the attributes that a method reads of its first argument, with their lines."""
     try:
         lines, first = inspect.getsourcelines(function)
         tree = ast.parse(textwrap.dedent("".join(lines)))

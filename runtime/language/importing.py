@@ -55,7 +55,8 @@ def _stamp(file: Path) -> tuple[int, int]:
 
 
 def _fresh(module: ModuleType, file: Path) -> ModuleType:
-    """The module, executed anew if its file has changed since; what it imports stays as it is.
+    """Return the module, executed anew if its file has changed since; modules that it imports stay
+    as they are.
 
     Raises:
         BlockImportError: it fails.
@@ -75,7 +76,7 @@ def _fresh(module: ModuleType, file: Path) -> ModuleType:
 
 
 def import_module(module_name: str) -> ModuleType:
-    """An installed module.
+    """Import an installed module.
 
     Raises:
         UnknownModuleError: there is none of that name.
@@ -109,7 +110,7 @@ def _from_file(module_name: str, file: Path, folder: Path) -> ModuleType:
 
 
 def _is_importable(top: str, folder: Path) -> bool:
-    """Whether importing ``top`` gives the module or package in that folder, and no other."""
+    """Return whether importing ``top`` gives the module or package in that folder, and no other."""
     try:
         spec = importlib.util.find_spec(top)
     except ValueError:  # a module without a spec, such as __main__
@@ -143,7 +144,8 @@ def _import_file(key: str, file: Path) -> ModuleType:
 
 
 def _import_error(module_name: str, error: BaseException) -> AloftError:
-    """The error to raise for a module that could not be imported: it is missing, or it failed."""
+    """Return the error to raise for a module that could not be imported: it is missing, or it
+    failed."""
     last = traceback.format_exception_only(error)[-1].strip()
     if isinstance(error, SyntaxError):
         return BlockImportError(last, f"{error.filename}:{error.lineno}:{error.offset}")

@@ -1,6 +1,6 @@
 """Blocks whose calls of kernels are only known at set-up, such as one for each of a list of tasks.
 
-A block whose step is one kernel says so by ``@kernel`` (see ``steps``). This is for the others::
+A block whose step is one kernel marks it with ``@kernel`` (see ``steps``). This is for the others::
 
     class WholeBody(KernelBlock):
         def setup(self) -> None:

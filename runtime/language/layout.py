@@ -17,7 +17,7 @@ from .errors import DeclarationError
 from .signals import DTYPES, Signal, Slot
 
 LARGEST = 1_000_000_000
-"""How many bytes the signals and states of a graph may need; a robot's usually need some 10 kB."""
+"""Largest size of the signals and states of a graph [bytes]; a robot's usually need some 10 kB."""
 ALIGNMENT = 64
 """Bytes: the size of a cache line, and the alignment of the widest vector instructions."""
 
@@ -76,7 +76,7 @@ class Layout:
         return cls(slots, lengths, offsets, size)
 
     def locate(self, section: str, index: int) -> str:
-        """The name of one element of a section, ``block.port.field[index]``.
+        """Return the name of one element of a section, ``block.port.field[index]``.
 
         Raises:
             IndexError: the section has no such element.
@@ -91,7 +91,7 @@ class Layout:
         return name + (f"[{', '.join(str(int(i)) for i in place)}]" if slot.shape else "")
 
     def byte_range(self, name: str) -> tuple[int, int]:
-        """The first byte of a slot and the byte after its last. Raises ``KeyError``."""
+        """Return the first byte of a slot and the byte after its last. Raises ``KeyError``."""
         slot = self.slots[name]
         item = DTYPES[slot.section].itemsize
         start = self.offsets[slot.section] + slot.start * item
@@ -116,6 +116,6 @@ class Layout:
 
 
 def only_field(port: str, signals: Iterable[str]) -> str | None:
-    """The field of a port, where it has only one; wires are written so, too."""
+    """Return the field of a port, where it has only one; wires are written so, too."""
     fields = [name for name in signals if name.rpartition(".")[0] == port]
     return fields[0] if len(fields) == 1 else None

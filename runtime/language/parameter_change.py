@@ -35,5 +35,5 @@ class Adjustment:
     answered: bool = False
 
     def changes(self) -> tuple[ParameterChange, ...]:
-        """The changes of single parameters that the adjustment has made."""
+        """Return the changes of single parameters that the adjustment has made."""
         return tuple(ParameterChange(self.tick, *value) for value in self.values)

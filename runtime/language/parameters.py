@@ -57,7 +57,7 @@ live_parameter = partial(parameter, live=True)
 
 
 def is_live(info: FieldInfo) -> bool:
-    """Whether a parameter was declared as one that may change while the graph runs."""
+    """Return whether a parameter was declared as one that may change while the graph runs."""
     extra = info.json_schema_extra
     return isinstance(extra, dict) and bool(extra.get("live", False))
 
@@ -95,7 +95,8 @@ def given_values(params: Parameters, prefix: str = "") -> Iterator[tuple[str, An
 
 
 def takes_none(info: FieldInfo) -> bool:
-    """Whether ``none`` stands for YAML's null: the parameter may be left out, and no word is called so."""
+    """Return whether ``none`` stands for YAML's null: the parameter may be left out, and no word is
+    called so."""
     kinds = get_args(info.annotation)
     words = [word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
     return type(None) in kinds and str not in kinds and "none" not in words
@@ -133,7 +134,7 @@ class Parameters(BaseModel):
 
     @classmethod
     def kernel_kinds(cls) -> Mapping[str, Kind]:
-        """What the equations of a kernel see of each parameter."""
+        """Return the kind of each parameter in the equations of a kernel."""
         return parameter_kinds(cls)
 
     @model_validator(mode="before")
@@ -155,7 +156,8 @@ class Parameters(BaseModel):
 
 
 def parameter_kinds(params: type[Parameters]) -> dict[str, Kind]:
-    """What a kernel sees of each parameter: numbers, vectors and matrices of numbers, and words."""
+    """Return the kind of each parameter for a kernel: numbers, vectors and matrices of numbers, and
+    words."""
     scope = vars(sys.modules[params.__module__])
     return {
         name: kind

@@ -46,7 +46,7 @@ class PerJoint(RootModel[StrictFloat | dict[str, StrictFloat]]):
         return data
 
     def resolve(self, robot: RobotDescription) -> NDArray[np.float64]:
-        """The values in the order of the description's joints, (n_joints,).
+        """Return the values in the order of the description's joints, (n_joints,).
 
         Raises:
             LookupError: a pattern matches no joint, or a joint has no value. Loading reports both,
@@ -60,7 +60,7 @@ class PerJoint(RootModel[StrictFloat | dict[str, StrictFloat]]):
         return np.array([self._value(joint.name) for joint in robot.joints], dtype=np.float64)
 
     def unmatched_patterns(self, robot: RobotDescription) -> tuple[str, ...]:
-        """The patterns that match none of the robot's joints."""
+        """Return the patterns that match none of the robot's joints."""
         names = [joint.name for joint in robot.joints]
         return tuple(
             pattern
@@ -69,7 +69,7 @@ class PerJoint(RootModel[StrictFloat | dict[str, StrictFloat]]):
         )
 
     def joints_without_value(self, robot: RobotDescription) -> tuple[str, ...]:
-        """The robot's joints that no pattern matches."""
+        """Return the robot's joints that no pattern matches."""
         names = (joint.name for joint in robot.joints)
         return tuple(name for name in names if self._value(name) is None)
 
@@ -102,7 +102,8 @@ class PerJoint(RootModel[StrictFloat | dict[str, StrictFloat]]):
 
 
 def by_name(values: Sequence[Any], robot: RobotDescription) -> dict[str, Any]:
-    """The likely meaning of a list of values by position, by joint name; empty if it is unclear.
+    """Return the likely meaning of a list of values by position, by joint name; empty if it is
+    unclear.
 
     The list is taken for one value for every joint, or one for every joint of a leg, from the base
     outwards and the same for all legs.
@@ -123,7 +124,7 @@ def by_name(values: Sequence[Any], robot: RobotDescription) -> dict[str, Any]:
 
 
 def _chain(robot: RobotDescription, link: str) -> Iterator[str]:
-    """The names of the joints from the base to a link."""
+    """Yield the names of the joints from the base to a link."""
     joint = next((joint for joint in robot.joints if joint.child == link), None)
     if joint is not None:
         yield from _chain(robot, joint.parent)
@@ -131,7 +132,7 @@ def _chain(robot: RobotDescription, link: str) -> Iterator[str]:
 
 
 def _pattern(names: Sequence[str]) -> str:
-    """The common start and the common end of some names, with a star between them."""
+    """Return the common start and the common end of some names, with a star between them."""
     shortest = min(len(name) for name in names)
     start = 0
     while start < shortest and len({name[start] for name in names}) == 1:

@@ -1,7 +1,7 @@
-"""What the numbers on a wire are: their unit and their frame, also behind blocks that take any.
+"""Quantities of the numbers on a wire: their unit and their frame, also behind general blocks.
 
 A general block such as ``Gain`` takes vectors of every unit. Its fields are ``inferred``: the graph
-decides what they are, and the block's ``infer_units`` method says how outputs follow from inputs.
+decides what they are, and the block's ``infer_units`` method derives outputs from inputs.
 Loading applies these methods from block to block, and then checks every wire.
 """
 
@@ -24,13 +24,13 @@ class Quantity:
     frame: str | None = None
 
     def times(self, unit: Unit | None, power: int = 1) -> Quantity:
-        """This quantity times a unit to a power; not checked if either of the two is not."""
+        """Return this quantity times a unit to a power; not checked if either of the two is not."""
         if self.unit is None or unit is None:
             return Quantity(None, self.frame)
         return Quantity(times(self.unit, unit, power), self.frame)
 
     def agrees(self, other: Quantity) -> bool:
-        """Whether numbers of one may be used as numbers of the other."""
+        """Return whether numbers of one may be used as numbers of the other."""
         units = self.unit is None or other.unit is None or self.unit.matches(other.unit)
         return units and (not self.frame or not other.frame or self.frame == other.frame)
 
@@ -40,21 +40,22 @@ class Quantity:
 
 
 UNCHECKED = Quantity(None)
-"""The quantity of numbers that nobody says anything about."""
+"""Quantity of numbers without a declared unit or frame."""
 
 
 def quantity_of(field: Field) -> Quantity | None:
-    """The quantity that a field declares; ``None`` for one that carries whatever is wired."""
+    """Return the quantity that a field declares; ``None`` for one that carries whatever is
+    wired."""
     return None if field.inferred else Quantity(field.unit, field.frame)
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """An input that does not have the quantity which its block needs.
+    """Input without the quantity that its block needs.
 
     ``port`` is the input's field, as ``port.field``. ``other`` is the input that it must agree
-    with, if there is one. ``reason`` says why, such as ``sin takes an angle``. ``expected`` is ``None``
-    where no one quantity would do.
+    with, if there is one. ``reason`` explains it, such as ``sin takes an angle``. ``expected`` is
+    ``None`` where no one quantity would do.
     """
 
     port: str
@@ -84,7 +85,7 @@ class InputQuantities:
         return next((n for n in self._quantities if n.startswith(f"{port}.")), f"{port}.value")
 
     def alike(self, *ports: str) -> Quantity | None:
-        """The one quantity that all these inputs must have; unknown ones are passed over."""
+        """Return the one quantity that all these inputs must have; unknown ones are passed over."""
         known = [(self._name(port), self[port]) for port in ports]
         first, result = "", None
         for name, found in known:

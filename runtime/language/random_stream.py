@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array, Counts
-from ...mathematics.compiling.library_call import LibraryCall, address_of
+from ...mathematics.compiling.foreign_call import ForeignCall, address_of
 from .block import Block
 from .signals import Field, Signal
 
@@ -88,40 +88,41 @@ def load_generator(bits: np.random.BitGenerator, words: NDArray[np.int64]) -> No
 
 
 def _signed(word: int) -> int:
-    """The 64 bits of a whole number as a signed one, which an array of integers holds."""
+    """Return the 64 bits of a whole number as a signed one, which an array of integers holds."""
     return word - (1 << 64) if word >= 1 << 63 else word
 
 
-def normal_call(generator: np.random.Generator, out: Array) -> LibraryCall:
+def normal_call(generator: np.random.Generator, out: Array) -> ForeignCall:
     """Draws numbers of mean zero and variance one into ``out``, (n,)."""
-    return LibraryCall(
+    return ForeignCall(
         partial(generator.standard_normal, out=out), _addresses()[0], _bits(generator), out.size,
         out.ctypes.data,
     )  # fmt: skip
 
 
-def uniform_call(generator: np.random.Generator, out: Array) -> tuple[LibraryCall, Counts]:
+def uniform_call(generator: np.random.Generator, out: Array) -> tuple[ForeignCall, Counts]:
     """Draws numbers between zero and one into ``out``, (n,), and where it is read how many, (1,)."""
 
     def draw() -> None:
         for k in range(int(count[0])):
             out[k] = generator.random()
 
-    call = LibraryCall(draw, _addresses()[1], _bits(generator), out.size, out.ctypes.data)
+    call = ForeignCall(draw, _addresses()[1], _bits(generator), out.size, out.ctypes.data)
     count = call.words[2:3]
     return call, count
 
 
 def _bits(generator: np.random.Generator) -> int:
-    """The address of what NumPy's functions draw from; it is the generator's for all its life."""
+    """Return the address of the state that NumPy's functions draw from, which lasts as long as the
+    generator."""
     interface = generator.bit_generator.ctypes
     return int(interface.bit_generator.value or 0)
 
 
 @cache
 def _addresses() -> tuple[int, int]:
-    """The addresses of the functions behind ``standard_normal`` and ``random``; zeros where NumPy does
-    not give them away, and then Python calls these."""
+    """Return the addresses of the functions behind ``standard_normal`` and ``random``; zeros where
+    NumPy does not export them, so that Python calls them instead."""
     from numpy.random import _generator
 
     try:

@@ -30,7 +30,7 @@ class FieldReference:
 
 @dataclass(frozen=True)
 class PortReference:
-    """One port; ``note`` says if it is optional or carries simulation truth."""
+    """One port; ``note`` marks optional inputs and simulation truth."""
 
     name: str
     signal: str
@@ -50,7 +50,7 @@ class ParameterReference:
     bounds: str
     text: str
     live: bool = False
-    """Whether it may be changed while a graph runs."""
+    """True if it may be changed while a graph runs."""
 
     @property
     def full_text(self) -> str:
@@ -60,7 +60,7 @@ class ParameterReference:
 
 @dataclass(frozen=True)
 class BlockReference:
-    """Everything a user of a block needs to know."""
+    """Reference of a block for its users."""
 
     name: str
     summary: str
@@ -75,12 +75,12 @@ class BlockReference:
     parameters: tuple[ParameterReference, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """The reference as plain data."""
+        """Return the reference as plain data."""
         return asdict(self)
 
 
 def block_reference(name: str, block_type: type[Block]) -> BlockReference:
-    """The contract of the block class that graph files call ``name``."""
+    """Return the contract of the block class that graph files call ``name``."""
     text = inspect.getdoc(block_type) or ""
     return BlockReference(
         name=name,
@@ -123,7 +123,8 @@ def _parameter(name: str, info: FieldInfo) -> ParameterReference:
 
 
 def type_text(annotation: Any) -> str:
-    """A type as it is written in code: ``float``, ``list[float]``, ``'daqp' | 'quadprog'``."""
+    """Format a type as it is written in code: ``float``, ``list[float]``, ``'daqp' |
+    'quadprog'``."""
     origin = get_origin(annotation)
     arguments = get_args(annotation)
     if origin is Literal:

@@ -43,7 +43,8 @@ def snake_case(name: str) -> str:
 
 @lru_cache(maxsize=1)
 def _own_blocks() -> Mapping[str, Path]:
-    """The blocks of aloft and their files, found by parsing the files without importing them."""
+    """Return the blocks of aloft and their files, found by parsing the files without importing
+    them."""
     return blocks_in_packages(_ROOT, PACKAGES)
 
 
@@ -53,7 +54,8 @@ def _entry_points() -> Mapping[str, str]:
 
 
 def known_names() -> tuple[str, ...]:
-    """The names of all blocks of aloft and of installed packages, sorted; none is imported."""
+    """Return the names of all blocks of aloft and of installed packages, sorted; none is
+    imported."""
     return tuple(sorted({**_own_blocks(), **_entry_points()}))
 
 
@@ -67,7 +69,7 @@ def all_blocks() -> dict[str, type[Block]]:
 
 
 def block_name(block_type: type[Block]) -> str:
-    """The name that a graph file may use for a block's class."""
+    """Return the name that a graph file may use for a block's class."""
     module = block_type.__module__
     package = module.removeprefix(f"{_OURS}.").partition(".")[0]
     if module.startswith(f"{_OURS}.") and package in PACKAGES:
@@ -76,7 +78,7 @@ def block_name(block_type: type[Block]) -> str:
 
 
 def find_block(name: str, folder: Path | None = None) -> type[Block]:
-    """The block class called ``name``; files in ``folder`` and in the current folder can be
+    """Find the block class called ``name``; files in ``folder`` and in the current folder can be
     imported as modules.
 
     Raises:
@@ -101,8 +103,8 @@ def find_block(name: str, folder: Path | None = None) -> type[Block]:
 
 
 def find_class(name: str, folder: Path | None = None) -> object:
-    """The object that ``module:Class`` names; files in ``folder`` and in the current folder can be
-    imported as modules.
+    """Find the object that ``module:Class`` names; files in ``folder`` and in the current folder
+    can be imported as modules.
 
     Raises:
         UnknownBlockError: there is no such module, or it has no such name.
@@ -117,13 +119,14 @@ def find_class(name: str, folder: Path | None = None) -> object:
 
 
 def _places(folder: Path | None) -> tuple[Path, ...]:
-    """The folders in which a user's modules are searched for, in this order."""
+    """Return the folders in which a user's modules are searched for, in this order."""
     return (folder, Path()) if folder is not None else (Path(),)
 
 
 @cache
 def _own_module(package: str, class_name: str) -> ModuleType | None:
-    """The module of aloft that has the class: first the one that convention gives, then any."""
+    """Return the module of aloft that has the class: first the one that convention gives, then
+    any."""
     stem = snake_case(class_name)
     for path in files_of(_ROOT / package):
         if path.stem == stem:
@@ -173,9 +176,9 @@ def nearest_names(name: str, folder: Path | None = None, count: int = 3) -> tupl
     scored: dict[str, float] = {}
     for candidate, least in candidates:
         other_package, other_class = _parts(candidate)
-        likeness = _likeness(class_name, other_class)
-        if likeness >= least:
-            scored.setdefault(candidate, likeness + 0.2 * _likeness(package, other_package))
+        similarity = _similarity(class_name, other_class)
+        if similarity >= least:
+            scored.setdefault(candidate, similarity + 0.2 * _similarity(package, other_package))
     ordered = sorted(scored, key=lambda each: (-scored[each], each))
     return tuple(each for each in ordered[:count] if scored[each] >= scored[ordered[0]] - 0.2)
 
@@ -185,7 +188,7 @@ def _parts(name: str) -> tuple[str, str]:
     return ".".join(parts[:-1]), parts[-1]
 
 
-def _likeness(a: str, b: str) -> float:
+def _similarity(a: str, b: str) -> float:
     return difflib.SequenceMatcher(None, a.lower(), b.lower()).ratio()
 
 

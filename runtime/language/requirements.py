@@ -22,7 +22,7 @@ _NAMED: Mapping[Need, str] = {
 
 
 def has(robot: RobotDescription, need: Need) -> bool:
-    """Whether the robot has what a block needs."""
+    """Return whether the robot has a property that a block needs."""
     match need:
         case "robot":
             return True
@@ -37,7 +37,7 @@ def has(robot: RobotDescription, need: Need) -> bool:
 
 
 def fix_without_robot() -> str:
-    """The line to write into a graph that needs a robot and names none."""
+    """Return the line to write into a graph that needs a robot and names none."""
     first, *others = robot_names()
     return f"robot: {first}" + (f"  # or {', '.join(others)}" if others else "")
 
@@ -125,7 +125,7 @@ def _ends(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def _lack(robot: RobotDescription, need: Need) -> str:
-    """What the robot has instead, as the end of a sentence for a message."""
+    """Describe what the robot has instead, as the end of a sentence for a message."""
     if need == "floating base":
         return f"has a {robot.base_joint} base"
     return "has none"

@@ -93,7 +93,7 @@ def _edges(blocks: Sequence[ScheduleBlock]) -> list[_Edge]:
 
 
 def order_blocks(blocks: Iterable[ScheduleBlock]) -> tuple[str, ...]:
-    """The paths of ``blocks`` (given in file order) in the order they run within a tick.
+    """Return the paths of ``blocks`` (given in file order) in the order they run within a tick.
 
     Raises:
         LoopError: there is no such order.
@@ -120,7 +120,7 @@ def order_blocks(blocks: Iterable[ScheduleBlock]) -> tuple[str, ...]:
 
 
 def find_loops(blocks: Iterable[ScheduleBlock]) -> tuple[Loop, ...]:
-    """The rings without a delay; together they contain every wire that lies on any ring.
+    """Return the rings without a delay; together they contain every wire that lies on any ring.
 
     Each is a shortest ring through a wire that no earlier ring contains. It starts at that of its
     blocks which comes first in the file.
@@ -147,12 +147,13 @@ def find_loops(blocks: Iterable[ScheduleBlock]) -> tuple[Loop, ...]:
 
 
 def _without_ends(edges: Sequence[_Edge]) -> list[_Edge]:
-    """The edges without those that lead to no ring, or that no ring leads to."""
+    """Return the edges without those that lead to no ring, or that no ring leads to."""
     return _without_sinks(_without_sinks(edges, reverse=False), reverse=True)
 
 
 def _without_sinks(edges: Sequence[_Edge], *, reverse: bool) -> list[_Edge]:
-    """The edges without those into blocks that nothing leaves, until there are none of these.
+    """Return the edges without those into blocks that nothing leaves, until there are none of
+    these.
 
     With ``reverse`` all edges point the other way.
     """
@@ -177,7 +178,7 @@ def _without_sinks(edges: Sequence[_Edge], *, reverse: bool) -> list[_Edge]:
 def _shortest_path(
     leaving: Sequence[Sequence[_Edge]], start: int, goal: int
 ) -> tuple[_Edge, ...] | None:
-    """The edges of a shortest path from ``start`` to ``goal``, or ``None`` if there is none.
+    """Return the edges of a shortest path from ``start`` to ``goal``, or ``None`` if there is none.
 
     The path is empty if both are the same block.
     """
@@ -201,12 +202,12 @@ def _shortest_path(
 
 
 def runs_at(tick: int, period: int, offset: int) -> bool:
-    """Whether a block with this period and offset [ticks] runs in ``tick``."""
+    """Return whether a block with this period and offset [ticks] runs in ``tick``."""
     return tick % period == offset % period
 
 
 def hyperperiod(periods: Iterable[int]) -> int:
-    """The number of ticks after which the pattern of running blocks repeats.
+    """Return the number of ticks after which the pattern of running blocks repeats.
 
     Raises:
         AloftError: it is longer than ``MAXIMAL_HYPERPERIOD``.
@@ -223,7 +224,8 @@ def hyperperiod(periods: Iterable[int]) -> int:
 
 
 def phases(rates: Sequence[tuple[int, int]]) -> tuple[tuple[int, ...], ...]:
-    """For each tick of the hyperperiod the indices of those ``rates`` (period, offset) that run.
+    """Return, for each tick of the hyperperiod, the indices of those ``rates`` (period, offset)
+    that run.
 
     Equal phases are one object, so that a long hyperperiod has few of them, too.
     """

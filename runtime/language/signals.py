@@ -64,7 +64,7 @@ class Field:
         text: one line on what the field is.
         values: what the numbers of an ``"int64"`` field stand for; shown by name in recordings.
         inferred: unit and frame are those of whatever the graph wires to the block: an input takes
-            any, and ``Block.infer_units`` says what an output has.
+            any, and ``Block.infer_units`` returns those of an output.
         ring: of a state that is a ring buffer along its first axis: the field with the place of its
             oldest entry, ``name`` of the same signal or ``state.name`` of the same block.
 
@@ -123,7 +123,7 @@ class Field:
         def __set__(self, instance: Signal, value: Any) -> None: ...
 
     def resolve(self, dimensions: Mapping[str, int]) -> tuple[int, ...]:
-        """The shape in numbers.
+        """Return the shape in numbers.
 
         Raises:
             KeyError: a dimension's name is not in ``dimensions``.
@@ -131,7 +131,7 @@ class Field:
         return tuple(size if isinstance(size, int) else dimensions[size] for size in self.shape)
 
     def describe(self) -> str:
-        """The field's type in one line, e.g. ``float64[n_joints] rad``."""
+        """Return the field's type in one line, e.g. ``float64[n_joints] rad``."""
         shape = f"[{', '.join(map(str, self.shape))}]" if self.shape else ""
         unit = f" {self.unit}" if self.unit is not None else ""
         frame = f" in {self.frame}" if self.frame else ""
@@ -150,7 +150,7 @@ class Signal:
 
     @classmethod
     def bind(cls, views: Mapping[str, NDArray[Any]]) -> Self:
-        """An instance whose fields are the given arrays, themselves not copied."""
+        """Return an instance whose fields are the given arrays, themselves not copied."""
         signal = cls.__new__(cls)
         for name, view in views.items():  # using __dict__ would slow down every later access
             object.__setattr__(signal, name, view)
@@ -181,7 +181,8 @@ class Signal:
 
     @classmethod
     def kernel_kinds(cls) -> Mapping[str, Kind]:
-        """What the equations of a kernel see of each field: its known sizes and its elements."""
+        """Return the kind of each field in the equations of a kernel: its known sizes and its
+        elements."""
         elements: Mapping[str, type] = {"float64": float, "int64": int, "bool": bool}
         return {
             name: ArrayKind(
@@ -193,12 +194,12 @@ class Signal:
 
     @classmethod
     def allocate(cls, dimensions: Mapping[str, int] | None = None) -> Self:
-        """A free-standing zeroed instance with memory of its own, for tests and tools."""
+        """Return a free-standing zeroed instance with memory of its own, for tests and tools."""
         sizes = dimensions or {}
         return cls.bind({n: np.zeros(f.resolve(sizes), f.dtype) for n, f in cls.fields.items()})
 
     def views(self) -> Mapping[str, NDArray[Any]]:
-        """The arrays by field name, in the order of declaration."""
+        """Return the arrays by field name, in the order of declaration."""
         return {name: self.__dict__[name] for name in type(self).fields}
 
     def __iter__(self) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -224,7 +225,7 @@ class Slot:
 
 
 def signal_of(name: str, fields: Mapping[str, Mapping[str, Any]]) -> type[Signal]:
-    """A signal that is declared by data, such as the description of what was exported.
+    """Make a signal that is declared by data, such as the description of an exported one.
 
     Args:
         name: its name.
@@ -233,7 +234,7 @@ def signal_of(name: str, fields: Mapping[str, Mapping[str, Any]]) -> type[Signal
     Raises:
         DeclarationError: as for ``Field``.
     """
-    body: dict[str, Any] = {"__doc__": "What is outside."}
+    body: dict[str, Any] = {"__doc__": "A signal declared by data."}
     for key, field in fields.items():
         body[key] = Field(
             tuple(field.get("shape", ())),

@@ -66,7 +66,7 @@ class BlockSpec:
     offset_ticks: int = 0
     where: Position | None = None
     folder: Path = Path()
-    """Where the file lies that the block is written in; files it names are relative to it."""
+    """Folder of the file that the block is written in; files it names are relative to it."""
     quantities: Mapping[str, Quantity] = field(default_factory=dict)
     """Unit and frame of every field that carries what is wired, by ``port.field``."""
     machine: str = ""
@@ -95,7 +95,7 @@ Overrun = Literal["skip", "stop"]
 
 @dataclass(frozen=True)
 class LinkPolicy:
-    """What the reader of a free-running link does where no message has come for ``max_age`` [s].
+    """Policy of the reader of a free-running link when no message has come for ``max_age`` [s].
 
     ``hold`` keeps the last values, ``safe`` reads zeros, and ``stop`` ends the run.
     """
@@ -103,12 +103,12 @@ class LinkPolicy:
     max_age: float | None = None
     late: WhenLate = "stop"
     watch: bool = True
-    """Whether the silence of the link counts where it brings commands to actuators."""
+    """True if the silence of the link counts where it brings commands to actuators."""
 
 
 @dataclass(frozen=True)
 class LinkSettings:
-    """How parts on several machines keep together.
+    """Settings by which parts on several machines keep together.
 
     In ``lockstep`` each waits for the messages of its tick; ``free`` parts keep their own time and
     read the latest message. ``of`` has the policies of the links of single blocks.
@@ -120,18 +120,18 @@ class LinkSettings:
     paths: Mapping[str, float] = field(default_factory=dict)
     """The largest age [s] that is allowed on paths, ``block.output -> block.input``."""
     watchdog: float | None = None
-    """How long a link that brings commands to actuators may be silent [s]; by default
+    """Longest silence allowed to a link that brings commands to actuators [s]; by default
     ``WATCHDOG`` for real actuators, and any time for simulated ones."""
 
     def policy_of(self, source: str) -> LinkPolicy:
-        """The policy of the links that carry the outputs of the block ``source``."""
+        """Return the policy of the links that carry the outputs of the block ``source``."""
         return self.of.get(source, self.policy)
 
 
 @dataclass(frozen=True)
 class ClockSpec:
-    """How a run is paced: ``free`` (as fast as possible), ``paced`` (by wall time) or ``robot``
-    (the robot says when a tick begins), and what an overrun of a paced run leads to."""
+    """Pacing of a run: ``free`` (as fast as possible), ``paced`` (by wall time) or ``robot`` (the
+    robot's data start a tick), and the response to an overrun of a paced run."""
 
     kind: ClockKind = "free"
     overrun: Overrun = "skip"
@@ -172,7 +172,7 @@ class CheckedGraph:
         return 1.0 / self.base_rate
 
     def block(self, path: str) -> BlockSpec:
-        """The block at that path. Raises ``KeyError``."""
+        """Return the block at that path. Raises ``KeyError``."""
         for spec in self.blocks:
             if spec.path == path:
                 return spec

@@ -1,4 +1,4 @@
-"""A step that names what it takes: the runtime binds ports, state, scratch, constants by name.
+"""Steps that name their arguments: the runtime binds ports, state, scratch, constants by name.
 
 ::
 
@@ -15,7 +15,7 @@
 * ``clock``: the ``tick`` and the ``base_period`` [s] of the graph; ``period``: that of the block [s];
 * an array, a number or a named tuple that ``setup`` has stored in the block under that name.
 
-A kernel step that returns ``bool`` says whether ``Block.on_event`` is to be called after it, for what
+A kernel step that returns ``bool`` decides whether ``Block.on_event`` is called after it, for what
 happens rarely and needs Python.
 
 What differs from the declarations is refused when the class is made. A kernel gets of each signal the
@@ -91,7 +91,7 @@ def declare(cls: type[Any], function: FunctionType) -> None:
 
 
 def _declared(cls: type[Any], function: FunctionType, name: str) -> Kind:
-    """What an argument is by the declarations of the class."""
+    """Return the kind of an argument by the declarations of the class."""
     annotation = function.__annotations__.get(name)
     port = {**cls.inputs, **cls.outputs, **cls.states}.get(name)
     declared: Any = port.signal if port is not None else getattr(cls, _OWN.get(name, ""), None)
@@ -126,7 +126,7 @@ def _declared(cls: type[Any], function: FunctionType, name: str) -> Kind:
 
 
 def _names_type(annotation: Any, declared: type, cls: type, function: FunctionType) -> bool:
-    """Whether an annotation names the declared type, or one of its bases."""
+    """Return whether an annotation names the declared type, or one of its bases."""
     if annotation is None or annotation is declared:
         return True
     if isinstance(annotation, str):
@@ -148,7 +148,7 @@ def _shown(annotation: Any) -> str:
 
 
 def _line_of(cls: type, name: str) -> int | str:
-    """The line on which a class declares a name."""
+    """Return the line on which a class declares a name."""
     try:
         lines, first = inspect.getsourcelines(cls)
     except (OSError, TypeError):
@@ -160,7 +160,8 @@ def _line_of(cls: type, name: str) -> int | str:
 
 
 def step_in_file_of(cls: type, name: str, place: CodeType) -> Any:
-    """A method that makes a block's calls; stacks and reports of errors show the given place."""
+    """Make a method that makes a block's calls; stacks and reports of errors show the given
+    place."""
     method = _update if name == "update" else _step
     code = method.__code__.replace(
         co_filename=place.co_filename, co_firstlineno=place.co_firstlineno, co_name=name
@@ -218,7 +219,7 @@ def bind_steps(block: Block) -> None:
 
 
 def call_of(block: Block, function: Callable[..., object]) -> KernelCall | PythonCall:
-    """The call of a function that names what it takes of a block.
+    """Make the call of a function whose arguments name parts of a block.
 
     Raises:
         BlockError: something that it takes is missing or of a type that a kernel cannot take.
@@ -237,7 +238,8 @@ def call_of(block: Block, function: Callable[..., object]) -> KernelCall | Pytho
 
 
 def signal_call(function: Callable[..., None], *arguments: Any) -> KernelCall:
-    """The call of a kernel with these arguments, in their order; it gets of signals what it reads."""
+    """Make the call of a kernel with these arguments, in their order; of signals it gets what it
+    reads."""
     used = names_used(function)
     return KernelCall(
         function,
@@ -274,7 +276,7 @@ def _kernel_argument(block: Block, function: FunctionType, name: str, used: froz
 
 
 def as_record(signal: Signal, used: frozenset[str] | None = None) -> Any:
-    """The named tuple of those fields of a signal that kernels name; by default of all."""
+    """Return the named tuple of those fields of a signal that kernels name; by default of all."""
     views = signal.views()
     names = tuple(name for name in views if used is None or name in used) or tuple(views)[:1]
     return record_type(type(signal).__name__, names)(*(views[name] for name in names))

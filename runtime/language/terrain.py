@@ -40,7 +40,7 @@ class Ground:
 
     @property
     def level(self) -> bool:
-        """Whether its faces are normal to the world's axes."""
+        """True if its faces are normal to the world's axes."""
         return self.slope == (0.0, 0.0)
 
     @property
@@ -79,7 +79,7 @@ class Ground:
 
     @property
     def rise(self) -> float:
-        """By how much parts of its upper face are higher or lower than its middle [m]."""
+        """Largest height of its upper face above or below its middle [m]."""
         sides = (0.5 * (self.most[k] - self.least[k]) * math.tan(self.slope[k]) for k in range(2))
         return sum(abs(each) for each in sides)
 
@@ -130,7 +130,7 @@ class HeightField:
 class Terrain:
     """A level floor at height ``floor`` [m, world], and boxes and height fields that stand on it.
 
-    ``uneven`` is how far the ground under a foot may be from the height that a task says [m].
+    ``uneven`` is the largest deviation of the ground under a foot from the task's height [m].
     """
 
     floor: float = 0.0
@@ -164,18 +164,18 @@ class Terrain:
         )
 
     def height(self, x: float, y: float) -> float:
-        """The height [m, world] of the highest surface at that place."""
+        """Return the height [m, world] of the highest surface at that place."""
         return height_of_ground(self.surface, x, y, np.zeros(3))
 
     def normal(self, x: float, y: float) -> Vector:
-        """The normal [world] of the highest surface at that place."""
+        """Return the normal [world] of the highest surface at that place."""
         normal = np.zeros(3)
         height_of_ground(self.surface, x, y, normal)
         a, b, c = normal.tolist()
         return a, b, c
 
     def friction(self, x: float, y: float) -> float | None:
-        """The friction coefficient there; ``None`` where it is the scene's."""
+        """Return the friction coefficient there; ``None`` where it is the scene's."""
         best, found = self.floor, None
         for piece, alone in self._pieces():
             height = alone.height(x, y)
@@ -196,4 +196,4 @@ class SupportsScene(Protocol):
     """Parameters of a block whose world has ground; recordings draw it."""
 
     def build_scene(self, robot: RobotDescription | None) -> Terrain:
-        """The ground that these parameters describe, for a robot."""
+        """Build the ground that these parameters describe, for a robot."""

@@ -18,7 +18,7 @@ SECOND = parse_unit("s")
 
 @lru_cache(maxsize=1024)
 def times(a: Unit, b: Unit, power: int = 1) -> Unit:
-    """``a`` times ``b`` to a whole ``power``."""
+    """Multiply ``a`` by ``b`` to a whole ``power``."""
     powers = dict(symbol_powers(a.text))
     for symbol, exponent in symbol_powers(b.text).items():
         powers[symbol] = powers.get(symbol, 0) + power * exponent
@@ -31,13 +31,13 @@ def times(a: Unit, b: Unit, power: int = 1) -> Unit:
 
 
 def over(a: Unit, b: Unit) -> Unit:
-    """``a`` divided by ``b``."""
+    """Divide ``a`` by ``b``."""
     return times(a, b, -1)
 
 
 @lru_cache(maxsize=256)
 def root(unit: Unit) -> Unit:
-    """The unit whose square is ``unit``.
+    """Return the unit whose square is ``unit``.
 
     Raises:
         UnitError: there is none with whole powers, as for ``m^3``.
@@ -67,11 +67,11 @@ def _power(symbol: str, power: int) -> str:
 
 
 UNCHECKED = "unchecked"
-"""What a graph writes in place of a unit to say that it is not checked."""
+"""Text that a graph writes in place of a unit that is not checked."""
 
 
 def read_unit(text: str) -> Unit | None:
-    """The unit that a parameter ``unit`` names; ``None`` for ``unchecked``.
+    """Return the unit that a parameter ``unit`` names; ``None`` for ``unchecked``.
 
     Raises:
         UnitError: it is neither.

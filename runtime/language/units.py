@@ -37,15 +37,15 @@ class Unit:
         )
 
     def same_dimension(self, other: Unit) -> bool:
-        """Whether a value in one unit can be converted to the other."""
+        """Return whether a value in one unit can be converted to the other."""
         return self.exponents == other.exponents
 
     def matches(self, other: Unit) -> bool:
-        """Whether a value means the same in both units, with no conversion."""
+        """Return whether a value means the same in both units, with no conversion."""
         return self.same_dimension(other) and math.isclose(self.scale, other.scale, rel_tol=1e-12)
 
     def factor_to(self, other: Unit) -> float:
-        """The factor that converts a value in this unit to ``other``.
+        """Return the factor that converts a value in this unit to ``other``.
 
         Raises:
             UnitError: the two have different dimensions.
@@ -108,7 +108,7 @@ QUANTITY = re.compile(
 
 @lru_cache(maxsize=512)
 def parse_unit(text: str) -> Unit:
-    """The unit that ``text`` names.
+    """Return the unit that ``text`` names.
 
     A space or ``*`` multiplies; ``/`` divides by the single factor or bracket that follows it;
     ``^`` raises to an integer power. The empty text and ``1`` are dimensionless.
@@ -136,7 +136,8 @@ def parse_unit(text: str) -> Unit:
 
 @lru_cache(maxsize=512)
 def symbol_powers(text: str) -> Mapping[str, int]:
-    """The power of every symbol in a unit's text: ``{"N": 1, "m": 1, "rad": -1}`` for ``N m/rad``.
+    """Return the power of every symbol in a unit's text: ``{"N": 1, "m": 1, "rad": -1}`` for ``N
+    m/rad``.
 
     Raises:
         UnitError: the text is not a product of known symbols.
@@ -201,7 +202,7 @@ def _product(
 
 
 def parse_quantity(text: str, unit: str) -> float:
-    """The value in ``unit`` of a text such as ``70 N``, ``10 ms`` or ``1/3 kHz``.
+    """Return the value in ``unit`` of a text such as ``70 N``, ``10 ms`` or ``1/3 kHz``.
 
     A number without a unit is taken as it is.
 

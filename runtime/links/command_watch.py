@@ -1,6 +1,6 @@
 """Watches the links that bring commands to actuators: silence on one of them ends in damping.
 
-It counts when messages arrive, by the clock of this machine alone, so it holds whatever ``late`` says
+It counts when messages arrive, by the clock of this machine alone, so it holds whatever ``late`` is
 and whatever the estimate of the other clock is. What it finds is used twice: a driver hands it to
 the process that watches it (``hal/bear/watchdog.py``), which damps the drives although this process
 may hang, be stopped or be killed; and a part that runs free ends its run.
@@ -23,9 +23,9 @@ class WatchedLink(Protocol):
 
 
 class CommandWatch:
-    """Says how long commands have not come.
+    """Measures for how long no commands have come.
 
-    It begins to count when it is asked first, which is when the actuators are on.
+    It begins to count at the first query, which is when the actuators are on.
 
     Args:
         placed: the graph.
@@ -54,7 +54,8 @@ class CommandWatch:
         return tuple(box.link.name for box in self._watched)
 
     def heard(self) -> int:
-        """When the most silent link last brought a new message [ns]; zero if none is watched."""
+        """Return the time [ns] of the most silent link's last new message; zero if none is
+        watched."""
         if not self._watched:
             return 0
         if not self._since:
@@ -65,7 +66,8 @@ class CommandWatch:
         return oldest
 
     def complaint(self) -> str:
-        """Which link has been silent for too long; empty if none."""
+        """Return a complaint about the link that has been silent for too long; empty if none
+        has."""
         if not self._watched:
             return ""
         silence = (self._clock() - self.heard()) * 1e-9

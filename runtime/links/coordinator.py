@@ -44,11 +44,12 @@ class PartClock(Clock):
         self._agreed: tuple[str, str] | None = None
         self._is_first_request = False
         self.heard: Callable[[], int] | None = None
-        """What says when commands were last heard; see ``CommandWatch.heard``."""
+        """Source of the time of the last commands; see ``CommandWatch.heard``."""
         super().__init__(base_period)
 
     def commands_heard(self) -> int:
-        """When the most silent link that brings commands last brought one [ns]."""
+        """Return the time [ns] of the last commands on the most silent link that brings
+        commands."""
         return 0 if self.heard is None else self.heard()
 
     def agree(self, reason: str, block: str) -> None:
@@ -57,7 +58,7 @@ class PartClock(Clock):
 
     @property
     def stop_reason(self) -> str | None:
-        """Why all parts end after this tick."""
+        """Reason for which all parts end after this tick."""
         return self._agreed[0] if self._agreed else None
 
     @stop_reason.setter
@@ -93,7 +94,7 @@ class DistributedParameters(LiveParameters):
         self._before: Mapping[str, Parameters] = {}
 
     def proposal(self) -> Adjustment | None:
-        """The adjustment that waits here, if any."""
+        """Return the adjustment that waits here, if any."""
         return self.handed_in.popleft() if self.handed_in else None
 
     def try_settings(self, settings: Mapping[str, Any]) -> str:
@@ -142,25 +143,25 @@ REST_TIMEOUT = 2.0
 
 
 class TickMessageKind(IntEnum):
-    """What a part says about a tick."""
+    """Kind of a part's message about a tick."""
 
     DONE = 0
     """All its blocks have run."""
     STOP = 1
     """They have run, and a block or a signal asks for the end."""
     FAULT = 2
-    """A block failed; the tick counts for nobody."""
+    """A block failed; the tick is invalid on all parts."""
     WRONG_VALUE = 3
     """A value is not finite; the tick is recorded and is the last."""
     PROPOSE = 4
     """The tick is done, and parameters are to change before the next one."""
     ANSWER = 5
-    """Whether this part can take over a proposal."""
+    """Answer to a proposal: this part can take it over, or not."""
 
 
 @dataclass(frozen=True)
 class TickMessage:
-    """What another part said about a tick."""
+    """Message of another part about a tick."""
 
     kind: TickMessageKind
     data: Mapping[str, Any] = field(default_factory=dict)
@@ -189,9 +190,8 @@ class LockstepCoordinator(Block):
     """The block of the runtime that starts first and ends each tick last.
 
     ``start`` waits until every part runs the same graph and a message has come through every link
-    in both directions. ``update`` tells the others how the tick ended here, and waits until all
-    have said so. Hence a stop, a fault and a change of parameters take effect everywhere in one
-    tick.
+    in both directions. ``update`` sends the others the outcome of the tick here, and waits for
+    theirs. Hence a stop, a fault and a change of parameters take effect everywhere in one tick.
     """
 
     waits_for_others = True
@@ -265,7 +265,7 @@ class LockstepCoordinator(Block):
         )
 
     def reach_phase(self, phase: PartPhase) -> None:
-        """Wait until all parts have started those blocks that ``phase`` says."""
+        """Wait until all parts have started the blocks of ``phase``."""
         self.peers.reach_phase(phase, self._connect_timeout)
 
     # -- at the end of each tick -------------------------------------------------------------------
@@ -274,11 +274,11 @@ class LockstepCoordinator(Block):
         """Do nothing: this block has no outputs."""
 
     def update(self) -> None:
-        """Say how the tick ended here, and hear how it ended elsewhere.
+        """Send the outcome of the tick here, and receive that of the others.
 
         Raises:
             PeerError: another part failed in this tick, or is gone.
-            RunError: another part said nothing for too long.
+            RunError: another part was silent for too long.
         """
         clock = self._clock
         tick = self._tick = clock.tick
@@ -427,7 +427,7 @@ class FaultReporter:
         self._last = -1
 
     def open(self, bound: BoundGraph) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
     def record(self, tick: int) -> None:
         """Remember which tick was recorded last."""
@@ -439,7 +439,7 @@ class FaultReporter:
             self._coordinator.report_fault(note, self._last)
 
     def close(self) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
 
 class StartBarrier(Block):
@@ -467,14 +467,14 @@ class FreeRunningCoordinator(LockstepCoordinator):
     """Starts the parts together, as in lockstep, and then lets each keep its own time.
 
     A tick waits for nobody. A part whose run ends in order ends the others too, and so does a
-    fault. One that is gone does not: what its links' policies say of late messages holds, and it
+    fault. One that is gone does not: the policies of its links for late messages hold, and it
     may come back. Beacons during the run are sent by a thread of their own.
     """
 
     _quiet: threading.Event | None = None
 
     def listen(self) -> None:
-        """Nothing to listen to: a tick ends when it ends here."""
+        """Do nothing: a tick ends when it ends here."""
 
     def reach_phase(self, phase: PartPhase) -> None:
         """Wait for the others; a part that moves actuators does not join a run that goes on.

@@ -20,13 +20,13 @@ from .peers import PeerStates
 TICK_TIME = "~tick"
 """The path of the block that keeps when ticks began."""
 JITTER_SHARE = 1.0 / 16.0
-"""How much of the jitter each message renews, as in RFC 3550, section 6.4.1."""
+"""Weight of each message in the estimate of jitter, as in RFC 3550, section 6.4.1."""
 KEPT = 4096
 """The number of last ages from which the percentiles are computed."""
 
 
 class LinkHealth(Signal):
-    """How a free-running link does, at each tick of its reader."""
+    """Health of a free-running link, at each tick of its reader."""
 
     age = Field(unit="s", text="since the source ran, by the estimated clock of its machine")
     jitter = Field(
@@ -45,7 +45,7 @@ class LinkHealth(Signal):
 
 
 class TickStart(Signal):
-    """When a tick of a part that runs free began."""
+    """Beginning of a tick of a part that runs free."""
 
     time = Field(dtype="int64", text="by the monotonic clock of its machine [ns]")
 
@@ -71,7 +71,7 @@ class LinkMonitor(Block):
 
 
 def health_path(link: MachineLink) -> str:
-    """The path of the block that shows how a free-running link does."""
+    """Return the path of the block that shows the health of a free-running link."""
     return f"{link.source}~from~{link.sender}"
 
 
@@ -83,7 +83,7 @@ class LatestReceiver:
     Args:
         link: the link.
         reader: what checks messages and writes them into the bus.
-        others: the other parts.
+        peers: the other parts.
         policy: what to do where nothing has come for too long.
         health: where to write how the link does.
         stop: called with the reason where the policy is to stop.
@@ -158,7 +158,7 @@ class LatestReceiver:
         self._transit, self._latest = transit, message
 
     def write_outputs(self, tick: int) -> None:
-        """Write the latest fields into the bus, or what the policy says where they are too old."""
+        """Write the latest fields into the bus, or apply the policy where they are too old."""
         now = self._clock()
         message = self._latest
         if self._since == 0:
@@ -203,7 +203,7 @@ class LatestReceiver:
         health.damaged[()] = self.damaged
 
     def about(self) -> dict[str, Any]:
-        """The counts, and percentiles of the age [ms] at the reader's ticks."""
+        """Return the counts, and percentiles of the age [ms] at the reader's ticks."""
         ages = self._ages[: min(self._count, KEPT)] * 1e-6
         median, high, longest = np.percentile(ages, [50, 99, 100]) if len(ages) else (0.0,) * 3
         return {

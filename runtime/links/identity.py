@@ -1,4 +1,4 @@
-"""What parts of one graph must have in common before they run together, and how they differ."""
+"""Identity of the parts of one graph, which must agree before they run together."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Identity:
 
     @classmethod
     def of(cls, placed: PlacedGraph) -> Identity:
-        """The identity of a placed graph; it is the same for all of its parts."""
+        """Return the identity of a placed graph; it is the same for all of its parts."""
         graph = placed.graph
         schema = []
         for spec in graph.blocks:
@@ -46,7 +46,7 @@ class Identity:
         return _hash(self.schema)
 
     def difference(self, other: Identity, mine: str, others: str) -> str:
-        """What differs from ``other``, in one sentence; empty if nothing does."""
+        """Describe the difference from ``other`` in one sentence; empty if there is none."""
         for what, here, there, ours, theirs in (
             ("graph", self.graph, other.graph, self.graph_hash, other.graph_hash),
             ("schema", self.schema, other.schema, self.schema_hash, other.schema_hash),

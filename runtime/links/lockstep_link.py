@@ -23,7 +23,7 @@ SLICE = 0.05
 
 
 class MailTimeoutError(Exception):
-    """What was waited for has not come in time."""
+    """An awaited item has not come in time."""
 
 
 class Mailbox(Generic[T]):
@@ -51,7 +51,7 @@ class Mailbox(Generic[T]):
         self._queue.put(None)
 
     def take(self, number: int, timeout: float) -> T:
-        """The item with that number; waits for it.
+        """Wait for the item with that number and return it.
 
         ``check`` is called whenever nothing has come for a while, and ends the wait by raising.
 
@@ -114,11 +114,11 @@ class LockstepReceiver:
 
     @property
     def surplus(self) -> int:
-        """How many messages came twice or too late."""
+        """Number of messages that came twice or too late."""
         return self._mailbox.surplus
 
     def about(self) -> dict[str, Any]:
-        """The counts."""
+        """Return the counts."""
         return {
             "name": self.link.name,
             "received": self.received,
@@ -199,7 +199,7 @@ _TYPES: dict[type[Block], type[LinkInput]] = {}
 
 
 def link_input_type(block_type: type[Block]) -> type[LinkInput]:
-    """The stand-in for blocks of that type on other machines."""
+    """Return the stand-in for blocks of that type on other machines."""
     if block_type not in _TYPES:
         body: dict[str, Any] = {"__doc__": LinkInput.__doc__, "Params": block_type.Params}
         kind: type[LinkInput] = type(f"LinkInput{block_type.__name__}", (LinkInput,), body)

@@ -1,4 +1,4 @@
-"""The messages of a link: raw fields behind a header that says what they are and whether they are whole.
+"""The messages of a link: raw fields behind a header that identifies them and has their checksum.
 
 A message is a header of ``HEADER`` bytes and the payload: the bytes of the link's fields as they lie
 in the bus, section by section. The header holds, in little endian,
@@ -48,7 +48,7 @@ class DamagedMessageError(ValueError):
 
 
 def schema_of(link: MachineLink) -> bytes:
-    """The schema hash of a link, 8 bytes."""
+    """Return the schema hash of a link, 8 bytes."""
     lines = [field.describe() for field in link.fields]
     return blake2b(json.dumps(lines).encode(), digest_size=8).digest()
 
@@ -63,7 +63,7 @@ class Span:
 
 
 def spans_of(link: MachineLink, layout: Layout) -> tuple[Span, ...]:
-    """Where the fields of a link lie in the bus; neighbouring fields are one stretch.
+    """Return the stretches of a link's fields in the bus; neighbouring fields are one stretch.
 
     The fields of a port that have one type are neighbours, so a port with fields of one type that
     are all read is one copy.
@@ -98,7 +98,7 @@ class MessageWriter:
         self.sequence = 0
 
     def write(self, tick: int, time: int) -> bytes:
-        """The message with what the bus holds now."""
+        """Return the message with the present values of the bus."""
         for target, source in self._copies:
             target[:] = source
         summed = self._summed
@@ -120,10 +120,10 @@ class MessageReader:
         self._length = HEADER + link.payload
         self._size = link.payload
         self.run = bytes(8)
-        """The run that messages must be of; the handshake says which."""
+        """Run that messages must belong to; set by the handshake."""
 
     def read(self, data: bytes) -> Message:
-        """The message in some bytes.
+        """Read the message in some bytes.
 
         Raises:
             DamagedMessageError: it is no message of this link and run, or not whole.

@@ -1,4 +1,4 @@
-"""What a part publishes about itself, and the observer that receives it anywhere and sends nothing.
+"""Status that a part publishes, and the observer that receives it anywhere and sends nothing.
 
 A thread of its own sends the part's status a few times a second, and the bus as it was some
 milliseconds ago for a live view. Both go under ``watch/``, at the lowest priority, and are dropped where
@@ -29,7 +29,7 @@ from .lockstep_link import LockstepReceiver
 from .peers import PeerStates
 
 ROWS = 50.0
-"""How often the bus is shown, at most [Hz]."""
+"""Largest rate at which the bus is shown [Hz]."""
 STATUS = 0.25
 """Seconds between two statuses."""
 _HEAD = Struct("<I8sq")
@@ -42,7 +42,7 @@ class StatusPublisher:
     Args:
         machine: of the part.
         transport: the part's own; it is open once the part has started.
-        others: the other parts, and the numbers by which the graph and the run are known.
+        peers: the other parts, and the numbers by which the graph and the run are known.
         receivers: the receiving ends of its links.
     """
 
@@ -92,7 +92,8 @@ class StatusPublisher:
         self._thread.join(1.0)
 
     def status(self, rate: float) -> dict[str, Any]:
-        """The status of the part; ``rate`` is how many ticks a second it makes at present."""
+        """Return the status of the part; ``rate`` is the ticks per second that it runs at
+        present."""
         peers = self._peers
         return {
             "machine": self._machine,
@@ -140,7 +141,7 @@ class StatusPublisher:
 
 
 def link_status(box: LockstepReceiver | LatestReceiver) -> dict[str, Any]:
-    """How a link does, without what takes long to compute."""
+    """Return the health of a link, without figures that take long to compute."""
     found: dict[str, Any] = {
         "name": box.link.name,
         "rate_hz": box.link.rate_hz,
@@ -155,7 +156,7 @@ def link_status(box: LockstepReceiver | LatestReceiver) -> dict[str, Any]:
 
 
 def read_row(data: bytes, size: int) -> tuple[int, bytes] | None:
-    """The tick and the bus in a message of ``rows_key``; ``None`` where it is not whole."""
+    """Return the tick and the bus in a message of ``rows_key``; ``None`` where it is not whole."""
     if len(data) != ROW_HEADER + size:
         return None
     checksum, _, tick = _HEAD.unpack_from(data)
@@ -164,7 +165,7 @@ def read_row(data: bytes, size: int) -> tuple[int, bytes] | None:
 
 
 STALE = 2.0
-"""Seconds after which a part that says nothing counts as silent."""
+"""Silence of a part after which it counts as silent [s]."""
 
 
 class Observer:
@@ -218,7 +219,7 @@ class Observer:
         self._transport.subscribe(window_key(machine), take)
 
     def seconds_since(self, machine: str) -> float | None:
-        """How long ago a machine was heard [s]; ``None`` if it never was."""
+        """Return the time since a machine was last heard [s]; ``None`` if it never was."""
         heard = self._received_at.get(machine)
         return None if heard is None else time.monotonic() - heard
 
@@ -232,7 +233,7 @@ class Observer:
         return tuple(name for name in machines if name not in self.statuses)
 
     def state_of(self, machine: str) -> str:
-        """Whether a machine runs this graph, another, or is silent."""
+        """Return whether a machine runs this graph, another, or is silent."""
         silent = self.seconds_since(machine)
         if silent is None or silent > STALE:
             return "silent"
@@ -242,7 +243,7 @@ class Observer:
         return str(status["phase"])
 
     def why_silent(self, name: str) -> str:
-        """What can be found out about a machine that is silent; empty for one that is heard."""
+        """Find the likely cause of a machine's silence; empty for one that is heard."""
         if self.state_of(name) != "silent":
             return ""
         return silent_endpoint(self.placed.machine(name).endpoint)

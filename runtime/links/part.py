@@ -49,12 +49,12 @@ COORDINATOR, PREPARED, STARTED = "~coordinator", "~prepared", "~started"
 
 
 def sender_path(link: MachineLink) -> str:
-    """The path of the block that sends on a link."""
+    """Return the path of the block that sends on a link."""
     return f"{link.source}~to~{link.receiver}"
 
 
 def part_graph(placed: PlacedGraph, machine: str) -> CheckedGraph:
-    """The graph that one machine runs.
+    """Return the graph that one machine runs.
 
     Blocks of other machines become stand-ins. One that is received from runs as late as it can:
     right before the first block that reads it, or at the end of the tick where only ``update``
@@ -107,7 +107,7 @@ def part_graph(placed: PlacedGraph, machine: str) -> CheckedGraph:
 
 
 def _own(path: str, block_type: type[Block], machine: str) -> BlockSpec:
-    """A block of the runtime, which has no ports."""
+    """Return a block of the runtime, which has no ports."""
     return BlockSpec(path, block_type, Parameters(), {}, machine=machine)
 
 
@@ -119,7 +119,7 @@ class BoundPart(BoundGraph):
         machine: the machine.
         transport: what carries messages; the part opens it when it starts.
         timeout: the seconds to wait for a message.
-        connect_time: the seconds to wait for the others at the start.
+        connect_timeout: the seconds to wait for the others at the start.
         clock: the time [ns] by which free-running links and the watch of commands go.
 
     Raises:
@@ -205,14 +205,15 @@ class BoundPart(BoundGraph):
 
     @property
     def is_free(self) -> bool:
-        """Whether the part keeps its own time."""
+        """True if the part keeps its own time."""
         return self.placed.graph.links.mode == "free"
 
     def _ask_to_stop(self, reason: str) -> None:
         self.clock.stop_reason = reason
 
     def _moving(self) -> dict[str, Block]:
-        """The blocks that move actuators: those that have something to do to come to rest."""
+        """Return the blocks that move actuators: those that have something to do to come to
+        rest."""
         still = Block.stop_cycle
         return {p: block for p, block in self.blocks.items() if type(block).stop_cycle is not still}
 
@@ -229,7 +230,7 @@ class BoundPart(BoundGraph):
             self._block(sender_path(link), LinkOutput).connect(writer, put, self._now)
 
     def _in_order_of_start(self) -> dict[str, Block]:
-        """The blocks in the order in which they start: those that move actuators come last.
+        """Return the blocks in the order in which they start: those that move actuators come last.
 
         Between the two stands a gate, so that nothing moves before all parts have come that far.
         """
@@ -246,7 +247,8 @@ class BoundPart(BoundGraph):
 
 
 def part_clock(bound: BoundPart) -> ClockSpec:
-    """How to pace a part: one part is paced as the graph says, and the others follow it.
+    """Return the pacing of a part: one part is paced as the graph requires, and the others follow
+    it.
 
     That part is the one with the block that drives the clock, or else the first machine. Where
     the parts run free, each is paced.
@@ -307,7 +309,8 @@ class MergedLayout:
                 copies.append((first, last, start))
 
     def rows(self, parts: Mapping[str, NDArray[np.uint8]]) -> NDArray[np.uint8]:
-        """The rows (n, bytes) of the whole from those of each part, (n, bytes of that part)."""
+        """Return the rows (n, bytes) of the whole from those of each part, (n, bytes of that
+        part)."""
         count = len(next(iter(parts.values())))
         rows = np.zeros((count, self._layout.size), np.uint8)
         for machine, copies in self._copies.items():
@@ -317,5 +320,5 @@ class MergedLayout:
 
 
 def hash_of(rows: NDArray[Any]) -> str:
-    """The run hash of rows (ticks, bytes), as ``sinks.RunHash`` has it."""
+    """Return the run hash of rows (ticks, bytes), as ``sinks.RunHash`` has it."""
     return blake2b(np.ascontiguousarray(rows).data, digest_size=16).hexdigest()

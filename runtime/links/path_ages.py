@@ -19,14 +19,15 @@ from .free_link import TICK_TIME, health_path
 MAX_TICKS = 20_000
 """The last ticks of a run that are looked at."""
 JITTER_ALLOWANCE = 0.05
-"""What is granted to the jitter of clocks, in base periods."""
+"""Allowance for the jitter of clocks, in base periods."""
 NAME = "links.paths"
-"""What the check is called among the blocks that give metrics."""
+"""Name of the check among the blocks that give metrics."""
 
 
 def path_sinks(graph: CheckedGraph, kind: str = "") -> list[PathAges]:
-    """What checks the ages of a run in one process, or in lockstep; nothing where none are allowed,
-    or where time is virtual. ``kind`` is that of the clock, by default the graph's."""
+    """Return the sinks that check the ages of a run in one process, or in lockstep; none where no
+    ages are limited, or where time is virtual. ``kind`` is that of the clock, by default the
+    graph's."""
     virtual = (kind or graph.clock.kind) == "free"
     return [] if virtual or not graph.links.paths else [PathAges(graph)]
 
@@ -62,10 +63,10 @@ class PathAges:
         self._count = 0
 
     def close(self) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The ages, and whether they were allowed."""
+        """Return the ages, and whether they were allowed."""
         kept = min(self._count, MAX_TICKS)
         order = np.argsort(self._ticks[:kept])
         line = Timeline(self._ticks[:kept][order].tolist(), self._began[:kept][order].tolist())
@@ -73,7 +74,8 @@ class PathAges:
 
 
 def check_path_ages(graph: CheckedGraph, timelines: Mapping[str, Timeline]) -> dict[str, Metric]:
-    """For each path the median and the longest age [ms]; and no success where one is too long."""
+    """Return the median and the longest age [ms] of each path; and no success where one is too
+    long."""
     found: dict[str, Metric] = {}
     complaints = []
     for path, limit in graph.links.paths.items():
@@ -97,7 +99,7 @@ def check_path_ages(graph: CheckedGraph, timelines: Mapping[str, Timeline]) -> d
 
 
 def timeline_of(placed: PlacedGraph, machine: str, ticks: NDArray[Any], view: Any) -> Timeline:
-    """The timeline of a part that ran free, from what it has recorded.
+    """Build the timeline of a part that ran free, from its recording.
 
     Args:
         placed: the graph.

@@ -1,9 +1,9 @@
-"""What one part knows of the others: how far each is, what each has checked, and what went wrong.
+"""State of the other parts, as known to one part: phase, links checked, and failures.
 
-Every part tells all others how far it is in *beacons*, which it repeats until all have answered. So
-a beacon that is lost, doubled or late does no harm. A beacon says what its sender has heard of the
-receiver, which answers at once if that is old. Beacons also give the offset of the other machine's
-clock.
+Every part sends its phase to all others in *beacons*, which it repeats until all have answered. So
+a beacon that is lost, doubled or late does no harm. A beacon carries the latest that its sender has
+heard of the receiver, which answers at once if that is old. Beacons also give the offset of the
+other machine's clock.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ class ClockOffset:
         self._theirs = self._arrived = 0
 
     def stamp(self, now: int) -> list[int]:
-        """What a beacon that leaves now carries: its time, and the latest beacon that has come."""
+        """Return the stamps of a beacon that leaves now: its time, and those of the latest beacon
+        received."""
         return [now, self._theirs, self._arrived]
 
     def update(self, stamp: Sequence[int], now: int) -> None:
@@ -74,10 +75,10 @@ process has ended, so that a part may be started again at once."""
 
 
 class PartPhase(IntEnum):
-    """How far a part is."""
+    """Phase of a part in its life."""
 
     HELLO = 0
-    """It is there and says what it would run."""
+    """The part is there and announces its graph."""
     LINKED = 1
     """Its graph is that of the others, and a message has come through each of its links."""
     PREPARED = 2
@@ -89,7 +90,7 @@ class PartPhase(IntEnum):
 
 
 class PeerError(RunError):
-    """Another machine failed or is gone. ``heard`` is true if it said so itself."""
+    """Another machine failed or is gone. ``heard`` is true if it reported the failure itself."""
 
     heard = False
 
@@ -101,7 +102,7 @@ class PeerStates:
         placed: the graph.
         machine: the name of this part's machine.
         transport: an open transport.
-        wanted: called while waiting; a text says why this part must not wait any longer.
+        stop_reason: called while waiting; returns the reason to stop waiting, if any.
         free: whether parts keep their own time. Then one that is gone may come back.
 
     Attributes:
@@ -150,7 +151,7 @@ class PeerStates:
             self._transport.subscribe(beacon_key(name, self.machine), self._on_beacon)
 
     def run_of(self, name: str) -> bytes | None:
-        """The number of the present run of another part; ``None`` before it was heard."""
+        """Return the number of the present run of another part; ``None`` before it was heard."""
         return bytes.fromhex(self._states[name]["run"]) if name in self._states else None
 
     def assume_started(self, name: str, run: bytes) -> None:
@@ -159,13 +160,13 @@ class PeerStates:
         self._states[name] = state
 
     def note_checked(self, link: str) -> None:
-        """A message has come through this link; any thread may say so."""
+        """Note that a message has come through this link; any thread may call this."""
         if link not in self._checked:
             self._checked[link] = None
             self._changed_event.set()
 
     def checked(self, link: str) -> bool:
-        """Whether a message has come through this link here."""
+        """Return whether a message has come through this link here."""
         return link in self._checked
 
     @property
@@ -175,20 +176,20 @@ class PeerStates:
 
     @property
     def phase(self) -> PartPhase:
-        """How far this part is."""
+        """Phase of this part."""
         return self._phase
 
     @property
     def started(self) -> bool:
-        """Whether all blocks of this part have started."""
+        """True if all blocks of this part have started."""
         return self._phase >= PartPhase.STARTED
 
     def are_running(self) -> bool:
-        """Whether some other part is past its start."""
+        """Return whether some other part is past its start."""
         return any(heard["phase"] >= PartPhase.STARTED for heard in tuple(self._states.values()))
 
     def ended(self) -> str:
-        """Why this part is to end, where another has ended in order; else empty.
+        """Return the reason for this part to end, where another has ended in order; else empty.
 
         Raises:
             PeerError: another part failed.
@@ -200,20 +201,20 @@ class PeerStates:
         return ""
 
     def _failures(self) -> tuple[tuple[int, PeerError], ...]:
-        """A copy, as a thread of the network may add one at any time."""
+        """Return a copy, as a thread of the network may add one at any time."""
         return tuple(self._failed.values())
 
     def clock_of(self, name: str) -> ClockOffset:
-        """The estimate of another machine's clock."""
+        """Return the estimate of another machine's clock."""
         return self._clocks[name]
 
     @property
     def fault_received(self) -> bool:
-        """Whether another part has said that it failed."""
+        """True if another part has reported that it failed."""
         return any(error.heard for _, error in self._failures())
 
     def has_checked(self, name: str, link: str) -> bool:
-        """Whether another part has received a message through this link."""
+        """Return whether another part has received a message through this link."""
         return link in self._states.get(name, {}).get("checked", ())
 
     def fail(self, name: str, tick: int, error: PeerError) -> None:
@@ -278,10 +279,12 @@ class PeerStates:
             self._changed_event.clear()
 
     def wait_for_rest(self, timeout: float, tick: int) -> None:
-        """Say that the actuators here are in damping, and wait until the others have said so.
+        """Report that the actuators here are in damping, and wait until the others have reported
+        so.
 
         It never raises, and does not wait for a part that is gone. Where this part could not start,
-        it says why until all have heard it. ``tick`` is the first that this part will not run.
+        it sends the reason until all have heard it. ``tick`` is the first that this part will not
+        run.
         """
         end = time.monotonic() + timeout
         self._phase, self._ended = PartPhase.RESTING, tick
@@ -363,7 +366,7 @@ class PeerStates:
                 self._send_beacon_to(name)
 
     def _runs_with(self, name: str) -> bool:
-        """Whether this part is in a run with the part ``name``, which is still there."""
+        """Return whether this part is in a run with the part ``name``, which is still there."""
         return (
             self._phase >= PartPhase.STARTED
             and self._states[name]["phase"] == PartPhase.STARTED

@@ -1,1 +1,1 @@
-"""What others may see of a graph while it runs, and the page on which they see and tune it."""
+"""View of a running graph for other processes, and the page on which users see and tune it."""

@@ -28,7 +28,7 @@ from .window import (
 )
 
 STALLED_AFTER = 1.0
-"""Seconds without a new tick after which it is said that the graph stands still."""
+"""Seconds without a new tick after which the graph is shown as standing still."""
 
 
 class LiveRun:
@@ -93,7 +93,7 @@ class LiveRun:
                 self._attach()
 
     def now(self) -> dict[str, Any]:
-        """What there is to say of this moment, as plain data."""
+        """Return the present state, as plain data."""
         with self._lock:
             assert self._reader is not None
             look = self._reader.look()
@@ -146,7 +146,7 @@ class LiveRun:
         }
 
     def _state(self, look: WindowContents | None) -> tuple[str, str]:
-        """What the run is doing, and what is said of it."""
+        """Return the state of the run, and a sentence on it."""
         if look is None:
             return "gone", "the process was stopped in the midst of a tick"
         if look.state == ENDED:
@@ -169,7 +169,7 @@ class LiveRun:
         return "running", ""
 
     def _other(self) -> dict[str, Any] | None:
-        """What another run at the same socket says of itself."""
+        """Return the description of another run at the same socket."""
         try:
             about, descriptor = ask_to_watch(self._path)
         except EndpointError:
@@ -188,7 +188,7 @@ class LiveRun:
 
     @property
     def can_be_paused(self) -> bool:
-        """Whether the run can be paused and go back."""
+        """True if the run can be paused and go back."""
         return not self._about["refusal"]
 
     def control(self, do: str, number: int | None = None) -> dict[str, Any]:
@@ -211,7 +211,7 @@ class LiveRun:
 
 
 def paused_text(control: dict[str, Any], period: float) -> str:
-    """What is said of a run that is paused: where, and how far back it can go."""
+    """Describe a paused run: its tick, and how far back it can go."""
     tick, kept = control["tick"], control["kept"]
     over = f" at its end ({control['over']})" if control["over"] else ""
     back = (
@@ -223,8 +223,8 @@ def paused_text(control: dict[str, Any], period: float) -> str:
 
 
 def _bus_of(graph: CheckedGraph, wanted: str) -> tuple[Layout, str, Collection[str]]:
-    """The layout of the bus of the graph or of one machine's part of it, the machine, and the blocks
-    whose outputs are known there.
+    """Return the layout of the bus of the graph or of one machine's part of it, the machine, and
+    the blocks whose outputs are known there.
 
     Raises:
         AloftError: none of them has the digest that is ``wanted``.
@@ -234,9 +234,9 @@ def _bus_of(graph: CheckedGraph, wanted: str) -> tuple[Layout, str, Collection[s
         return layout, "", [spec.path for spec in graph.blocks]
     if graph.machines:
         from ..links.part import part_graph
-        from ..placement.placed import place
+        from ..placement.placed import split_over_machines
 
-        placed = place(graph)
+        placed = split_over_machines(graph)
         for machine in placed.machines:
             part = part_graph(placed, machine.name)
             layout = Memory(part.blocks, part.robot).bus.layout
@@ -250,7 +250,7 @@ def _bus_of(graph: CheckedGraph, wanted: str) -> tuple[Layout, str, Collection[s
 
 
 def _load(about: dict[str, Any]) -> CheckedGraph:
-    """The graph that runs. Raises ``LoadError`` where its code or files have gone since."""
+    """Load the graph that runs. Raises ``LoadError`` where its code or files have gone since."""
     file, text = Path(about["file"] or f"{about['graph']}.yaml"), about["text"]
     if file.is_relative_to(Path.cwd()):
         file = file.relative_to(Path.cwd())  # so that places in it are short

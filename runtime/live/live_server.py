@@ -1,4 +1,4 @@
-"""Serves the page of a running graph to its user's browser, and nobody else.
+"""Serves the page of a running graph to its user's browser only.
 
 Every request must carry the token that only the printed address has, and must be made to the loopback
 address. What changes something is taken only as a POST of JSON from the page itself, so no page of
@@ -21,7 +21,7 @@ from ..language.stages import CheckedGraph
 from .tunables import Tunables, write_overlay
 
 Opened = Literal["diagram", "parameters"]
-"""What the side of the page shows at first."""
+"""Panel that the side of the page shows at first."""
 _HERE = Path(__file__).parent
 _CONTROLS = (
     '<span id="state" role="status">connecting</span>'
@@ -45,7 +45,7 @@ def live_page(
     save: str = "",
     opened: Opened = "diagram",
 ) -> str:
-    """The page's text.
+    """Return the page's text.
 
     Args:
         graph: what runs.
@@ -72,7 +72,7 @@ def live_page(
 
 
 def live_policy() -> str:
-    """The Content-Security-Policy of the page."""
+    """Return the Content-Security-Policy of the page."""
     return policy(_script())
 
 
@@ -93,10 +93,10 @@ class WatchedRun(Protocol):
 
     @property
     def has_parameters(self) -> bool:
-        """Whether parameters can be changed."""
+        """True if parameters can be changed."""
 
     def now(self) -> dict[str, Any]:
-        """What there is to say of this moment."""
+        """Return the present state."""
 
     def refresh(self) -> None:
         """Look at the graph that runs now."""
@@ -105,14 +105,14 @@ class WatchedRun(Protocol):
         """Look no more."""
 
     def parameters(self) -> list[dict[str, Any]]:
-        """The live parameters as they are now."""
+        """Return the live parameters as they are now."""
 
     def set(self, settings: list[str]) -> list[dict[str, Any]]:
         """Change parameters."""
 
     @property
     def can_be_paused(self) -> bool:
-        """Whether the run can be paused and go back."""
+        """True if the run can be paused and go back."""
 
     def control(self, do: str, number: int | None = None) -> dict[str, Any]:
         """Pause it, go back in it, or let it go on."""
@@ -150,7 +150,7 @@ class LiveServer(ThreadingHTTPServer):
         return f"http://{ADDRESS}:{self.server_address[1]}/?token={self.token}"
 
     def parameters(self) -> list[dict[str, Any]]:
-        """The live parameters as the page needs them. Raises ``AloftError``."""
+        """Return the live parameters as the page needs them. Raises ``AloftError``."""
         graph = self.run.graph
         if self._tunables is None or self._tunables[0] is not graph:
             self._tunables = graph, Tunables(graph)
@@ -222,7 +222,7 @@ class _RequestHandler(LoopbackHandler):
         return {"file": str(server.save), "count": len(written), "parameters": written}
 
     def _body(self) -> dict[str, Any] | None:
-        """The request's JSON object; a request without one is refused."""
+        """Return the request's JSON object; refuse a request without one."""
         length = self.headers.get("Content-Length", "")
         if not length.isdecimal() or int(length) > LONGEST_BODY:
             self._refuse(413, f"a request has at most {LONGEST_BODY} bytes")
@@ -237,7 +237,7 @@ class _RequestHandler(LoopbackHandler):
         return body
 
     def _knows(self, token: str) -> bool:
-        """Whether the token is right; if not, the request is refused."""
+        """Return whether the token is right; refuse the request if not."""
         if secrets.compare_digest(token.encode(), self.server.token.encode()):
             return True
         self._refuse(403, "the token is missing or wrong: open the address that aloft printed")

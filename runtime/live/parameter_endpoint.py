@@ -143,7 +143,7 @@ class ParameterEndpoint:
 
 
 def _about(bound: BoundGraph) -> dict[str, Any]:
-    """What somebody who watches must know to load the same graph."""
+    """Return the description from which a viewer loads the same graph."""
     graph = bound.graph
     return {
         "graph": graph.name,
@@ -163,7 +163,7 @@ def _answer(
     watch: Callable[[], dict[str, Any]],
     control: RunControl,
 ) -> dict[str, Any]:
-    """The answer to one request; a request that makes no sense gets an error as its answer."""
+    """Answer one request; the answer to an invalid request is an error."""
     try:
         message = json.loads(request)
         verb = message["verb"]
@@ -191,7 +191,7 @@ def _answer(
 
 
 def _control(message: Mapping[str, Any], control: RunControl) -> dict[str, Any]:
-    """Do what is asked with the run, and say how it stands then. Raises ``AloftError``."""
+    """Control the run as requested, and return its state. Raises ``AloftError``."""
     do, ticks = message["do"], message.get("ticks")
     if do == "pause":
         control.pause()
@@ -218,10 +218,10 @@ def _read_line(connection: socket.socket) -> bytes:
 
 
 def ask(path: Path, request: Mapping[str, Any]) -> dict[str, Any]:
-    """The answer of the graph that listens at ``path``.
+    """Send a request to the graph that listens at ``path``, and return its answer.
 
     Raises:
-        EndpointError: nobody answers there, or the request was refused; the text says why.
+        EndpointError: nobody answers there, or the request was refused; the text has the reason.
     """
     answer, descriptors = _exchange(path, request)
     for descriptor in descriptors:
@@ -230,12 +230,13 @@ def ask(path: Path, request: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def ask_to_watch(path: Path) -> tuple[dict[str, Any], int]:
-    """What the graph that listens at ``path`` says of itself, and the descriptor of its window.
+    """Return the description of the graph that listens at ``path``, and the descriptor of its
+    window.
 
     Waits for a graph that is only starting.
 
     Raises:
-        EndpointError: nobody answers there, or it cannot be watched; the text says why.
+        EndpointError: nobody answers there, or it cannot be watched; the text has the reason.
     """
     end = time.monotonic() + START_TIME
     while True:
@@ -253,7 +254,7 @@ def ask_to_watch(path: Path) -> tuple[dict[str, Any], int]:
 
 
 def _connected(path: Path) -> socket.socket:
-    """A connection to the graph that listens at ``path``.
+    """Connect to the graph that listens at ``path``.
 
     Linux refuses at once (EAGAIN) a connection that would have to wait behind others, where the socket has a
     timeout, so the wait is made here.
@@ -298,7 +299,7 @@ def _exchange(path: Path, request: Mapping[str, Any]) -> tuple[dict[str, Any], l
 
 
 def answers(path: Path) -> bool:
-    """Whether some run listens at ``path``."""
+    """Return whether some run listens at ``path``."""
     try:
         _connected(path).close()
     except TimeoutError:
@@ -315,7 +316,7 @@ def set_parameters(path: Path, settings: Sequence[str]) -> list[dict[str, Any]]:
         The changes that were made, as the attributes of each ``ParameterChange``.
 
     Raises:
-        EndpointError: nobody answers there, or a setting was refused; the text says why.
+        EndpointError: nobody answers there, or a setting was refused; the text has the reason.
     """
     changes: list[dict[str, Any]] = ask(path, {"verb": "set", "settings": list(settings)})[
         "changes"

@@ -1,4 +1,4 @@
-"""What one part of a spread graph shows of itself to a page anywhere: its window, sent now and then.
+"""Feed of one part of a spread graph to a page anywhere: its window, sent now and then.
 
 The control thread renews the part's window as that of any run; see ``window``. A thread of its own sends
 a copy under ``watch/``, at the lowest priority, dropped where a queue is full. A message is a
@@ -25,7 +25,7 @@ from ..transports.transport import MessageCallback, Transport, window_key
 from .window import Window, WindowContents, WindowLayout, WindowReader, digest, parse_window
 
 RATE = 5.0
-"""How often the window is sent [Hz]."""
+"""Rate at which the window is sent [Hz]."""
 FAREWELL = 0.05
 """Seconds that the last message has to leave before the part disconnects."""
 _HEAD = Struct("<II")
@@ -113,7 +113,7 @@ class PartFeed:
 
 @dataclass(frozen=True)
 class PartWindow:
-    """What a part showed at one moment.
+    """Content of a part's window at one moment.
 
     Attributes:
         digest: by which the layout of its bus is known; see ``window.digest``.
@@ -129,13 +129,13 @@ class PartWindow:
 
 
 def packed(about: dict[str, Any], copy: bytes) -> bytes:
-    """A message: what is said of a window, and its bytes."""
+    """Pack the description of a window, and its bytes, into a message."""
     said = json.dumps(about).encode()
     return _HEAD.pack(crc32(copy, crc32(said)), len(said)) + said + copy
 
 
 def read_part(data: bytes) -> PartWindow | None:
-    """What a message says; ``None`` where it is not whole or not of this version."""
+    """Read a message; ``None`` where it is not whole or not of this version."""
     if not _HEAD.size <= len(data) <= LONGEST:
         return None
     checksum, length = _HEAD.unpack_from(data)

@@ -62,7 +62,7 @@ class SpreadRun:
 
     @property
     def has_parameters(self) -> bool:
-        """Whether parameters can be changed from here."""
+        """True if parameters can be changed from here."""
         return self._control is not None
 
     def _watch(self, placed: PlacedGraph) -> None:
@@ -83,7 +83,7 @@ class SpreadRun:
             observer.__exit__()
 
     def is_heard(self, seconds: float) -> bool:
-        """Whether any part answers within this many seconds."""
+        """Return whether any part answers within this many seconds."""
         end = time.monotonic() + seconds
         while all(part.data is None for part in self._parts.values()):
             if time.monotonic() >= end:
@@ -97,7 +97,7 @@ class SpreadRun:
             self._follow()
 
     def now(self) -> dict[str, Any]:
-        """What there is to say of this moment, as plain data."""
+        """Return the present state, as plain data."""
         with self._lock:
             found = {name: part.now() for name, part in self._parts.items()}
             if all(part["state"] in ("ended", "gone", "unheard") for part in found.values()):
@@ -155,7 +155,7 @@ class SpreadRun:
 
 
 class _Part:
-    """What is known of one part."""
+    """State of one part as known here."""
 
     def __init__(self, placed: PlacedGraph, machine: str) -> None:
         graph = part_graph(placed, machine)

@@ -1,4 +1,4 @@
-"""What is said of a moment of a running graph: its values, and the times of its blocks."""
+"""Texts on one moment of a running graph: its values, and the times of its blocks."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class ValueTexts:
         return found
 
     def brief(self, bus: NDArray[np.uint8]) -> dict[str, str]:
-        """The first numbers of the first field of every output, by ``block.port``."""
+        """Return the first numbers of the first field of every output, by ``block.port``."""
         found: dict[str, str] = {}
         for field in self._fields:
             if field.port not in found:
@@ -72,7 +72,7 @@ class _Field:
     names: Mapping[int, str]
 
     def named(self, value: NDArray[Any]) -> str:
-        """The name of a value that has one."""
+        """Return the name of a value that has one."""
         return self.names.get(int(value.item()), "") if self.names and value.size == 1 else ""
 
 
@@ -86,14 +86,14 @@ def _brief(value: NDArray[Any], unit: str) -> str:
 
 
 def _number(value: float) -> str:
-    """Three digits; what is so small that nobody sees it is zero."""
+    """Format a number with three digits; magnitudes below 1e-9 become zero."""
     return "0" if abs(value) < 1e-9 else f"{value:.3g}"
 
 
 def time_texts(
     programs: Sequence[Sequence[str]], stamps: Sequence[NDArray[np.int64]], late: dict[str, int]
 ) -> dict[str, tuple[str, str]]:
-    """For each block, the time it took in the last ticks: in a word, and in a sentence.
+    """Return the times that each block took in the last ticks: in a word, and in a sentence.
 
     Args:
         programs: for each phase of the hyperperiod, the block of each call.
@@ -123,7 +123,7 @@ def time_texts(
 
 
 def tick_text(stamps: Sequence[NDArray[np.int64]], period: float) -> str:
-    """How long all blocks of a tick take together, of the period [s] that they have."""
+    """Describe the time that all blocks of a tick take together, as a share of the period [s]."""
     ticks = [rows[:, -1] - rows[:, 0] for rows in stamps if len(rows)]
     if not ticks:
         return ""
@@ -135,7 +135,7 @@ def tick_text(stamps: Sequence[NDArray[np.int64]], period: float) -> str:
 
 
 def duration(nanoseconds: float) -> str:
-    """A duration with three digits and a unit that fits."""
+    """Format a duration with three digits and a unit that fits."""
     for limit, scale, unit in ((1e6, 1e3, "µs"), (1e9, 1e6, "ms")):
         if nanoseconds < 0.9995 * limit:
             return f"{nanoseconds / scale:.3g} {unit}"

@@ -90,7 +90,7 @@ class Tunables:
         }
 
     def _place(self, path: str) -> str:
-        """Where a parameter is written; of one that is not, its block's place."""
+        """Return the place where a parameter is written; of one that is not, its block's place."""
         if path in self._places:
             return self._places[path]
         block = path.rpartition(".")[0]
@@ -105,7 +105,7 @@ class Tunables:
 def _leaves(
     path: str, value: Any, start: Any, info: FieldInfo | None, inside: Any
 ) -> Iterator[tuple[str, Any, Any, FieldInfo | None]]:
-    """The values of a parameter that are not mappings, with their paths and declarations."""
+    """Yield the values of a parameter that are not mappings, with their paths and declarations."""
     if not isinstance(value, Mapping):
         yield path, value, start, info
         return
@@ -117,7 +117,7 @@ def _leaves(
 
 
 def _kind(value: Any, info: FieldInfo | None) -> tuple[str, list[str]]:
-    """How a value is changed, and what it can be if that is a choice."""
+    """Return the kind of control for a value, and its choices if it has any."""
     if isinstance(value, bool):
         return "choice", ["true", "false"]
     if isinstance(value, int | float):
@@ -134,7 +134,7 @@ def _kind(value: Any, info: FieldInfo | None) -> tuple[str, list[str]]:
 
 
 def _bounds(info: FieldInfo | None) -> tuple[float | None, float | None, str]:
-    """The least and the greatest value, and the same in words."""
+    """Return the least and the greatest value, and the same in words."""
     least: float | None = None
     most: float | None = None
     words = []
@@ -152,7 +152,7 @@ def _bounds(info: FieldInfo | None) -> tuple[float | None, float | None, str]:
 
 
 def _constraints(info: FieldInfo | None) -> Iterator[Any]:
-    """The constraints of a parameter, and of the numbers of a list."""
+    """Yield the constraints of a parameter, and of the numbers of a list."""
     if info is None:
         return
     yield from info.metadata
@@ -162,7 +162,7 @@ def _constraints(info: FieldInfo | None) -> Iterator[Any]:
 
 
 def _range(start: Any, least: float | None, most: float | None) -> tuple[float, float]:
-    """The ends of a slider: the bounds, and where there are none, what is likely to be tried."""
+    """Return the ends of a slider: the bounds, and where there are none, a likely range."""
     numbers = start if isinstance(start, list) else [start]
     known = [float(x) for x in numbers if isinstance(x, int | float)]
     size = max((abs(x) for x in known), default=0.0) or 1.0
@@ -172,7 +172,7 @@ def _range(start: Any, least: float | None, most: float | None) -> tuple[float, 
 
 
 def _places(graph: CheckedGraph) -> dict[str, str]:
-    """Where each parameter that the file gives is written, by ``block.parameter``."""
+    """Return the place of each parameter that the file gives, by ``block.parameter``."""
     found: dict[str, str] = {}
     if not Path(graph.file).is_file():
         return found
@@ -181,23 +181,23 @@ def _places(graph: CheckedGraph) -> dict[str, str]:
     except LoadError:
         return found
     for block in flat.blocks:
-        _add_places(block.path, block.parameters, found)
+        _add_locations(block.path, block.parameters, found)
     return found
 
 
-def _add_places(path: str, node: MapNode, found: dict[str, str]) -> None:
+def _add_locations(path: str, node: MapNode, found: dict[str, str]) -> None:
     for entry in node:
         key = f"{path}.{entry.key}"
         found[key] = str(entry.key_where)
         if isinstance(entry.value, MapNode):
-            _add_places(key, entry.value, found)
+            _add_locations(key, entry.value, found)
 
 
 FIRST_LINE = "# Values that were tuned while the graph ran; `aloft run` takes this file."
 
 
 def changed(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """The rows of parameters that have another value than when the run began."""
+    """Return the rows of parameters that have another value than when the run began."""
     return [row for row in rows if row["value"] != row["start"]]
 
 

@@ -1,4 +1,4 @@
-"""What a running graph shows of itself, in shared memory: its signals, and when its blocks ran.
+"""Window of a running graph in shared memory: its signals, and when its blocks ran.
 
 The control thread copies its bus and the last time stamps there, ``RATE`` times a second of the
 graph's time; it asks and waits for nobody. Another process that was given the memory's descriptor reads
@@ -29,21 +29,21 @@ from ..running.ticker import Ticker
 from ..running.timing import STAMPED_TICKS
 
 RATE = 25.0
-"""How often the window is renewed [per second of the graph's time]."""
+"""Rate at which the window is renewed [per second of the graph's time]."""
 SEQUENCE, TICK, STATE, OVERRUNS, SKIPPED, CHANGES, SAID = range(7)
 """The words of the head; ``SAID`` is the length of the text about the end [bytes]."""
 HEAD = 8
 STARTING, RUNNING, ENDED, PAUSED = range(4)
-"""What ``STATE`` can be."""
+"""Values of ``STATE``."""
 TEXT = 4096
-"""Room for the text about the end [bytes]."""
+"""Space for the text about the end [bytes]."""
 MOST_STAMPS = 1 << 20
 """Bytes of stamps that are shown at most; a graph with so many phases shows times of some only."""
 
 
 @dataclass(frozen=True)
 class WindowLayout:
-    """Where what lies in a window.
+    """Layout of a window.
 
     Attributes:
         blocks: the paths of all blocks, whose missed deadlines are counted.
@@ -73,7 +73,7 @@ class WindowLayout:
         return self.text_start + TEXT
 
     def stamps(self, number: int) -> tuple[int, int]:
-        """The bytes of a program's stamps: the first, and the one after the last."""
+        """Return the bytes of a program's stamps: the first, and the one after the last."""
         sizes = [8 * STAMPED_TICKS * (len(owners) + 1) for owners in self.programs]
         first = self.bus_start + -(-self.bus // 8) * 8 + sum(sizes[:number])
         return first, first + sizes[number]
@@ -187,7 +187,7 @@ class Window:
 
 
 def digest(layout: Layout, graph: CheckedGraph) -> str:
-    """What two processes compare to know that they mean the same by the bytes of a bus."""
+    """Hash the layout of a bus; two processes with equal digests read its bytes alike."""
     from hashlib import blake2b
 
     slots = [(name, slot.section, slot.start, slot.shape) for name, slot in layout.slots.items()]
@@ -197,12 +197,12 @@ def digest(layout: Layout, graph: CheckedGraph) -> str:
 
 
 TRIES = 50
-"""How often a window that is being written is read again, each a millisecond later."""
+"""Number of attempts to read a window that is being written, a millisecond apart."""
 
 
 @dataclass(frozen=True)
 class WindowContents:
-    """What a window showed at one moment.
+    """Content of a window at one moment.
 
     Attributes:
         tick: the last tick that is shown.
@@ -211,7 +211,7 @@ class WindowContents:
         skipped: how many periods were left out.
         changes: how many changes of parameters there were.
         late: for each block, how many deadlines passed while it ran.
-        said: why the run has ended.
+        said: the reason for which the run has ended.
         bus: the bytes of the bus.
         stamps: for each program, the stamps [ns] of its last ticks, (ticks, calls + 1).
     """
@@ -239,12 +239,13 @@ class WindowReader:
         self._fence = Lock()
 
     def look(self) -> WindowContents | None:
-        """What the window shows now; ``None`` where its writer was stopped while it wrote."""
+        """Read the present content of the window; ``None`` where its writer was stopped while it
+        wrote."""
         copy = self.copy()
         return None if copy is None else parse_window(copy, self.shape)
 
     def copy(self) -> bytes | None:
-        """The window's bytes as they are now; ``None`` as for ``look``."""
+        """Return the window's bytes as they are now; ``None`` as for ``look``."""
         for _ in range(TRIES):
             before = self._sequence()
             with self._fence:
@@ -266,7 +267,7 @@ class WindowReader:
 
 
 def parse_window(copy: bytes, shape: WindowLayout) -> WindowContents:
-    """What the bytes of a window say, which must be as many as its shape has."""
+    """Parse the bytes of a window, whose number must be that of its shape."""
     words = np.frombuffer(copy, np.int64, shape.text_start // 8)
     length = min(int(words[SAID]), TEXT)
     said = copy[shape.text_start : shape.text_start + length].decode(errors="replace")
@@ -286,7 +287,8 @@ def parse_window(copy: bytes, shape: WindowLayout) -> WindowContents:
 def _stamps(
     copy: bytes, shape: WindowLayout, words: NDArray[np.int64], number: int
 ) -> NDArray[np.int64]:
-    """The rows of a program that hold stamps, the oldest first, each in the order of time."""
+    """Return the rows of a program that hold stamps, the oldest first, each in the order of
+    time."""
     ticks, newest = words[shape.cursors + 2 * number :][:2].tolist()
     first, last = shape.stamps(number)
     rows = np.frombuffer(copy[first:last], np.int64).reshape(STAMPED_TICKS, -1)

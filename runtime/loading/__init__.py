@@ -1,4 +1,4 @@
-"""From a YAML file to a checked graph, with every mistake in one report.
+"""Loading of a graph: from a YAML file to a checked graph, with every mistake in one report.
 
 Its stages have a folder each: ``reading`` (one file as it is written, with the place of every key) ->
 ``flattening`` (includes and sub-graphs expanded, overrides applied) -> ``checking``

@@ -17,7 +17,7 @@ from .reading.overrides import Overrides
 
 
 def load(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
-    """The graph in a file, ready to be bound and run.
+    """Load and check the graph in a file, ready to be bound and run.
 
     Args:
         path: the graph file; messages show it as it is given.
@@ -33,7 +33,8 @@ def load(path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
 
 
 def load_text(text: str, path: str | Path, overrides: Overrides = ()) -> CheckedGraph:
-    """The graph in a text; files it names are searched for as if the text were the file ``path``.
+    """Load and check the graph in a text; files it names are searched for as if the text were the
+    file ``path``.
 
     Raises:
         LoadError: the graph is wrong; the error carries the report of all problems.
@@ -45,7 +46,7 @@ def load_text(text: str, path: str | Path, overrides: Overrides = ()) -> Checked
 
 
 def check(path: str | Path, overrides: Overrides = ()) -> Report:
-    """The report on a graph file; ``ok`` when it may run."""
+    """Check a graph file and return the report; ``ok`` when it may run."""
     problems = Problems()
     with _collector_paused():
         check_graph(flatten_file(graph_path(path), overrides, problems), problems)
@@ -53,7 +54,7 @@ def check(path: str | Path, overrides: Overrides = ()) -> Report:
 
 
 def flatten(path: str | Path, overrides: Overrides = ()) -> FlatGraph:
-    """The graph with includes and sub-graphs expanded and overrides applied; see its ``text``.
+    """Flatten a graph: expand includes and sub-graphs, and apply overrides; see its ``text``.
 
     Raises:
         LoadError: some file cannot be read or expanded. Wires and values are not checked here.

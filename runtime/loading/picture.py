@@ -8,9 +8,9 @@ from typing import Any
 
 from ..background.background_block import BackgroundBlock
 from ..language.delay import WireDelay
-from ..language.fault import Fault, FaultParameters
 from ..language.quantities import Quantity
 from ..language.registry import block_name
+from ..language.signal_error import SignalError, SignalErrorParameters
 from ..language.stages import BlockSpec, CheckedGraph, Wire
 from .checking.inserted import ConstantSignal, Gather
 
@@ -40,7 +40,7 @@ class InputRow:
     """All outputs that are read, each as ``block.port``."""
 
     def text(self) -> str:
-        """The input in one line."""
+        """Return the input in one line."""
         notes = [self.signal]
         if self.delay:
             notes.append(f"delay {self.delay}")
@@ -80,7 +80,7 @@ def table(graph: CheckedGraph) -> tuple[BlockRow, ...]:
 
 
 def table_json(graph: CheckedGraph) -> dict[str, Any]:
-    """The table as plain data."""
+    """Return the table as plain data."""
     return {
         "name": graph.name,
         "base_rate_hz": graph.base_rate,
@@ -118,7 +118,7 @@ def _latency(graph: CheckedGraph, spec: BlockSpec) -> str:
 
 def _use(spec: BlockSpec) -> str:
     block_type = spec.block_type
-    if issubclass(block_type, Fault) and isinstance(spec.params, FaultParameters):
+    if issubclass(block_type, SignalError) and isinstance(spec.params, SignalErrorParameters):
         return f"{spec.params.kind}: {block_type.target}"
     for inserted, word in ((WireDelay, "delay"), (ConstantSignal, "constant"), (Gather, "parts")):
         if issubclass(block_type, inserted):
@@ -171,7 +171,8 @@ def _field(spec: BlockSpec, port: str, name: str) -> str:
 
 
 def _origin(specs: dict[str, BlockSpec], wire: Wire) -> str:
-    """The output a wire comes from, seen through the delay block that loading has inserted."""
+    """Return the output a wire comes from, seen through the delay block that loading has
+    inserted."""
     source = specs[wire.source_block]
     if wire.delay and issubclass(source.block_type, WireDelay):
         return source.wires["u"].source
@@ -192,10 +193,11 @@ def _hertz(graph: CheckedGraph, spec: BlockSpec) -> str:
 
 
 def mermaid(graph: CheckedGraph) -> str:
-    """The graph as a Mermaid flowchart.
+    """Draw the graph as a Mermaid flowchart.
 
-    Blocks on one machine have one colour. Rounded blocks are Moore machines. A dotted arrow is a delayed wire, a thick one joins blocks of
-    different rates; every arrow says which input it feeds, the signal, and what happens on the way.
+    Blocks on one machine have one colour. Rounded blocks are Moore machines. A dotted arrow is a
+    delayed wire, a thick one joins blocks of different rates; every arrow shows the input that it
+    feeds, the signal, and what happens on the way.
     """
     shown = [s for s in graph.blocks if not issubclass(s.block_type, INSERTED)]
     names = {spec.path: f"b{number}" for number, spec in enumerate(shown)}
@@ -225,7 +227,7 @@ def mermaid(graph: CheckedGraph) -> str:
 def _nodes(
     graph: CheckedGraph, specs: list[BlockSpec], names: dict[str, str], prefix: str, depth: int
 ) -> list[str]:
-    """The nodes below a path, with a box around every sub-graph."""
+    """Return the nodes below a path, with a box around every sub-graph."""
     lines: list[str] = []
     boxes: dict[str, list[BlockSpec]] = {}
     indent = "  " * depth

@@ -39,7 +39,7 @@ class GraphFile(CommonKeys, SubgraphKeys, GraphSections, GraphValues):
 
 
 def graph_schema(blocks: Mapping[str, type[Block]] | None = None) -> Schema:
-    """The schema for graphs of these blocks; by default for all registered blocks."""
+    """Return the schema for graphs of these blocks; by default for all registered blocks."""
     known = dict(blocks) if blocks is not None else all_blocks()
     schema = GraphFile.model_json_schema(ref_template="#/definitions/{model}")
     definitions: Schema = schema.pop("$defs")
@@ -64,12 +64,13 @@ def graph_schema(blocks: Mapping[str, type[Block]] | None = None) -> Schema:
 
 
 def schema_text() -> str:
-    """The schema as the text of a file."""
+    """Return the schema as the text of a file."""
     return json.dumps(graph_schema(), indent=1) + "\n"
 
 
 def _particular_schema(name: str, block_type: type[Block], definitions: Schema) -> Schema:
-    """The part of the schema that only blocks of this type have: their parameters and inputs."""
+    """Return the part of the schema that only blocks of this type have: their parameters and
+    inputs."""
     model = block_type.Params.model_json_schema()
     for inner, schema in model.pop("$defs", {}).items():
         inside = definitions[f"{name}.{inner}"] = _relocate(schema, name)
@@ -115,14 +116,16 @@ def _particular_schema(name: str, block_type: type[Block], definitions: Schema) 
 
 
 def _quantity(schema: Schema) -> list[Schema]:
-    """What else a value with a unit may be: a text with a unit may stand for each number, also in a list."""
+    """Return alternatives for a value with a unit: a text may stand for each number, also in a
+    list."""
     per_joint = "PerJoint" in json.dumps(schema)
     inside = {"type": "object"} if per_joint else {"type": "array"}
     return [{"type": "string", "pattern": "^[-+0-9.]"}, inside]
 
 
 def _further_inputs(block_type: type[Block]) -> Schema | bool:
-    """What inputs may be called that the class does not declare: their parameters may make some."""
+    """Return the schema of inputs that the class does not declare: their parameters may make
+    some."""
     made = block_type.specialize.__func__ is not Block.specialize.__func__  # type: ignore[attr-defined]
     return {"$ref": "#/definitions/Wire"} if made and not block_type.inputs else False
 
@@ -132,7 +135,7 @@ def _unit_text(schema: Mapping[str, Any]) -> str:
 
 
 def _relocate(schema: Any, name: str) -> Any:
-    """The schema with its references pointing to the common definitions."""
+    """Return the schema with its references pointing to the common definitions."""
     if isinstance(schema, dict):
         return {
             key: f"#/definitions/{name}.{value.rpartition('/')[2]}"

@@ -1,4 +1,4 @@
-"""How old the newest sample of an output is when an input that depends on it is used.
+"""Age of an output's newest sample when an input that depends on it is used.
 
 ``worst_age`` computes it before a run, from rates, offsets, order, delays and the limits of free-running
 links; ``measured_ages`` computes it from the times at which ticks began and messages were read in a run.
@@ -63,12 +63,12 @@ class _SampleTimes:
                 self.kept[spec.path].append(self.newest(spec, now))
 
     def newest(self, spec: BlockSpec, now: float) -> Instant:
-        """The newest sample that any input of a block depends on."""
+        """Return the newest sample that any input of a block depends on."""
         found = [self.read(spec, name, now) for name in spec.wires]
         return max((time for time in found if time is not None), default=None)
 
     def read(self, spec: BlockSpec, name: str, now: float) -> Instant:
-        """The newest sample that one input depends on."""
+        """Return the newest sample that one input depends on."""
         wire = spec.wires[name]
         source = wire.source_block
         time = self.sampled if wire.source == self.source else self.output.get(source)
@@ -80,7 +80,7 @@ class _SampleTimes:
 
 
 def worst_age(graph: CheckedGraph, source: str, target: str) -> float | None:
-    """The largest age [s] of the newest sample of ``source`` at ``target``.
+    """Return the largest age [s] of the newest sample of ``source`` at ``target``.
 
     Args:
         graph: the graph.
@@ -130,12 +130,13 @@ def worst_age(graph: CheckedGraph, source: str, target: str) -> float | None:
 
 
 SampleTime = int | None
-"""When the newest sample was taken that a value depends on, by the clock of a machine [ns]."""
+"""Time of the newest sample that a value depends on, by the clock of a machine [ns]; ``None`` where
+it depends on none."""
 
 
 @dataclass(frozen=True)
 class LinkTimes:
-    """What a free-running link gave in each tick of its reader, each (n,).
+    """Messages of a free-running link in each tick of its reader, each (n,).
 
     Attributes:
         tick: the tick in which the source had run; -1 before the first message.
@@ -179,7 +180,8 @@ class _PartSamples:
         self.output: dict[str, SampleTime] = {}
         self.sampled: SampleTime = None
         self.known: dict[tuple[int, str], SampleTime] = {}
-        """What the outputs of a tick depend on; the output that is followed has its own name."""
+        """Newest samples behind the outputs of a tick; the output that is followed has its own
+        name."""
         self.found: list[tuple[int, SampleTime]] = []
         self.done = False
 
@@ -258,7 +260,8 @@ class _PartSamples:
 def measured_ages(
     graph: CheckedGraph, timelines: Mapping[str, Timeline], source: str, target: str
 ) -> NDArray[np.float64]:
-    """The age [s] of the newest sample of ``source`` at ``target``, at every run of the reader.
+    """Return the age [s] of the newest sample of ``source`` at ``target``, at every run of the
+    reader.
 
     Args:
         graph: the graph.

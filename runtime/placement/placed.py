@@ -1,6 +1,6 @@
 """A placed graph: a checked graph divided among machines, with the links that join the parts.
 
-``place`` finds the links that the division needs; ``command_sources`` are the blocks whose commands reach actuators.
+``split_over_machines`` finds the links that the division needs; ``command_sources`` are the blocks whose commands reach actuators.
 The rest shows a placed graph as rows of a table and as JSON.
 """
 
@@ -46,7 +46,7 @@ class LinkField:
 
 @dataclass(frozen=True)
 class MachineLink:
-    """What one block sends to one other machine whenever it has run: one message.
+    """Message that one block sends to one other machine whenever it has run.
 
     ``fields`` holds only the fields that some block over there reads, in the order of the source's
     declaration. ``readers`` are the inputs that read them, as ``block.input``.
@@ -83,7 +83,7 @@ class PlacedGraph:
         return self.graph.machines
 
     def machine(self, name: str) -> MachineSpec:
-        """The machine called ``name``.
+        """Return the machine called ``name``.
 
         Raises:
             PlacementError: there is none; the error names those there are.
@@ -95,20 +95,20 @@ class PlacedGraph:
         raise PlacementError(f"the graph {self.graph.name} has no machine {name!r}; it has {known}")
 
     def blocks_on(self, machine: str) -> tuple[BlockSpec, ...]:
-        """The blocks that a machine runs, in file order."""
+        """Return the blocks that a machine runs, in file order."""
         return tuple(spec for spec in self.graph.blocks if spec.machine == machine)
 
     def sent_by(self, machine: str) -> tuple[MachineLink, ...]:
-        """The links on which a machine sends."""
+        """Return the links on which a machine sends."""
         return tuple(link for link in self.links if link.sender == machine)
 
     def received_by(self, machine: str) -> tuple[MachineLink, ...]:
-        """The links on which a machine receives."""
+        """Return the links on which a machine receives."""
         return tuple(link for link in self.links if link.receiver == machine)
 
 
-def place(graph: CheckedGraph) -> PlacedGraph:
-    """The placed graph of a graph that names its machines.
+def split_over_machines(graph: CheckedGraph) -> PlacedGraph:
+    """Place a graph that names its machines.
 
     Raises:
         PlacementError: the graph names no machines.
@@ -152,7 +152,7 @@ def place(graph: CheckedGraph) -> PlacedGraph:
 def spread(
     graph: CheckedGraph, machines: Mapping[str, str], places: Mapping[str, str]
 ) -> CheckedGraph:
-    """The same graph on other machines.
+    """Place the same graph on other machines.
 
     Args:
         graph: the graph; its own machines are forgotten.
@@ -194,13 +194,14 @@ def _field(name: str, field: Field, spec: BlockSpec) -> LinkField:
 
 
 def moves_actuators(spec: BlockSpec) -> bool:
-    """Whether a block has something to do to come to rest."""
+    """Return whether a block has something to do to come to rest."""
     return spec.block_type.stop_cycle is not Block.stop_cycle
 
 
 def silence_limit(graph: CheckedGraph, machine: str) -> float | None:
-    """How long the links that bring commands to a machine may be silent [s]; ``None`` where they
-    are not watched, because all actuators are simulated and the graph gives no time."""
+    """Return the longest silence allowed to the links that bring commands to a machine [s];
+    ``None`` where they are not watched, because all actuators are simulated and the graph gives no
+    time."""
     moving = [s for s in graph.blocks if s.machine == machine and moves_actuators(s)]
     if not moving:
         return None
@@ -210,9 +211,9 @@ def silence_limit(graph: CheckedGraph, machine: str) -> float | None:
 
 
 def command_sources(graph: CheckedGraph, machine: str) -> tuple[str, ...]:
-    """The blocks of other machines on whose outputs the actuators of a machine depend, through
-    whatever blocks of that machine, in the order in which they are found; without those whose
-    links are not to be watched."""
+    """Return the blocks of other machines on whose outputs the actuators of a machine depend,
+    through whatever blocks of that machine, in the order in which they are found; without those
+    whose links are not to be watched."""
     specs = {spec.path: spec for spec in graph.blocks}
     pending = [s for s in graph.blocks if s.machine == machine and moves_actuators(s)]
     seen = dict.fromkeys(spec.path for spec in pending)
@@ -230,7 +231,8 @@ def command_sources(graph: CheckedGraph, machine: str) -> tuple[str, ...]:
 
 
 def machine_rows(placed: PlacedGraph) -> list[tuple[str, str, str, str, str]]:
-    """For each machine: name, endpoint, its blocks, and the bytes a second it sends and receives."""
+    """Return for each machine: name, endpoint, its blocks, and the bytes a second it sends and
+    receives."""
     return [
         (
             machine.name,
@@ -244,7 +246,7 @@ def machine_rows(placed: PlacedGraph) -> list[tuple[str, str, str, str, str]]:
 
 
 def link_rows(placed: PlacedGraph) -> list[tuple[str, str, str, str, str]]:
-    """For each link: source, way, rate, payload and the inputs that read it."""
+    """Return for each link: source, way, rate, payload and the inputs that read it."""
     return [
         (
             link.source,
@@ -258,7 +260,7 @@ def link_rows(placed: PlacedGraph) -> list[tuple[str, str, str, str, str]]:
 
 
 def placement_json(placed: PlacedGraph) -> dict[str, Any]:
-    """The placement as plain data."""
+    """Return the placement as plain data."""
     return {
         "machines": [
             {

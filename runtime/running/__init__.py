@@ -1,1 +1,1 @@
-"""What runs a graph: memory, ticks, life cycle, clocks, and what is kept of a run."""
+"""Execution of a graph: memory, ticks, life cycle, clocks, and the record of a run."""

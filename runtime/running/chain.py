@@ -32,7 +32,7 @@ Calls = Literal["kernel_calls", "update_calls"]
 
 
 def can_be_chained(block: Block, which: Calls = "kernel_calls") -> bool:
-    """Whether a block's step, or its update, is nothing but compiled kernels."""
+    """Return whether a block's step, or its update, is nothing but compiled kernels."""
     calls = getattr(block, which)
     names = {"update"} if which == "update_calls" else {"step", "emit"}
     if names & type(block).overridden_steps:

@@ -58,7 +58,7 @@ class Difference:
 
 @dataclass
 class FieldDifference:
-    """How one field differs over all compared ticks."""
+    """Difference of one field over all compared ticks."""
 
     first: Difference
     ticks: int = 0
@@ -150,23 +150,23 @@ class Comparison:
         return sum(each.elements for each in self.fields.values())
 
     def largest(self) -> list[tuple[str, FieldDifference]]:
-        """The fields that differ, those with the largest difference first."""
+        """Return the fields that differ, those with the largest difference first."""
         return sorted(self.fields.items(), key=lambda item: (-item[1].largest, item[0]))
 
 
 def block_of(name: str) -> str:
-    """The block's path in ``block.port.field``."""
+    """Return the block's path in ``block.port.field``."""
     return name.rpartition(".")[0].rpartition(".")[0]
 
 
 def bits(values: NDArray[Any]) -> NDArray[Any]:
-    """The numbers' bit patterns, so that NaN equals itself and -0.0 differs from 0.0."""
+    """Return the numbers' bit patterns, so that NaN equals itself and -0.0 differs from 0.0."""
     patterns = np.ascontiguousarray(values).view(f"u{values.dtype.itemsize}")
     return patterns.reshape(values.shape)  # ascontiguousarray makes an array of a scalar
 
 
 def ulp_distances(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.uint64]:
-    """How many float64 values lie from each number to the other, neither being NaN."""
+    """Count the float64 values from each number to the other, neither being NaN."""
     first, second = _ranks(one), _ranks(other)
     low, high = np.minimum(first, second), np.maximum(first, second)
     # unsigned, because the distance of two large numbers of different sign overflows int64
@@ -174,7 +174,7 @@ def ulp_distances(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArr
 
 
 def ulp_distance(one: float, other: float) -> int | None:
-    """How many float64 values lie from one number to the other; ``None`` if one is NaN."""
+    """Count the float64 values from one number to the other; ``None`` if one is NaN."""
     if math.isnan(one) or math.isnan(other):
         return None
     return int(ulp_distances(np.array([one]), np.array([other]))[0])
@@ -187,7 +187,8 @@ def _ranks(values: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def common_names(one: Layout, other: Layout) -> tuple[list[str], list[str]]:
-    """The fields that both layouts have with equal type and shape, and a text for each other."""
+    """Return the fields that both layouts have with equal type and shape, and a text for each
+    other."""
     same, notes = [], []
     for name, slot in one.slots.items():
         there = other.slots.get(name)
@@ -215,7 +216,8 @@ class Translation:
         self._size = target.size
 
     def rows(self, rows: Rows) -> Rows:
-        """The rows (n, bytes) in the target's layout; zero where the source has no such field."""
+        """Return the rows (n, bytes) in the target's layout; zero where the source has no such
+        field."""
         if self.identical:
             return rows
         out = np.zeros((len(rows), self._size), np.uint8)

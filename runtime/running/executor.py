@@ -31,11 +31,11 @@ from .watchdog import Interrupts, Watchdog
 
 
 class Executor:
-    """Runs a graph, once.
+    """Runs a graph once.
 
     Args:
         graph: a checked graph, or a bound one.
-        clock: how to pace it; by default as the graph says.
+        clock: how to pace it; by default that of the graph.
         sinks: what records the run, beside the log and the hash.
         log: whether to keep every tick in memory.
         run_hash: whether to hash every tick.
@@ -110,10 +110,10 @@ class Executor:
         self._note("life", "ready: every block has started")
 
     def run(self, ticks: int | None = None) -> RunResult:
-        """Take the graph once through its whole life: start, ticks, stop cycles, close.
+        """Run the graph through its whole life: start, ticks, stop cycles, close.
 
         The run lasts ``ticks`` ticks, by default the graph's duration. SIGINT, SIGTERM and a block
-        that asks for it end the run after the present tick. The result says what ended the run,
+        that asks for it end the run after the present tick. The result has what ended the run,
         also if it was an error: see ``RunResult.raise_if_failed``.
 
         Raises:
@@ -191,7 +191,7 @@ class Executor:
             self.ticker.advance(control.ticks)
 
     def result(self, error: RunError | None = None) -> RunResult:
-        """The outcome so far of a run that is stepped; ``error`` is what has ended it."""
+        """Return the outcome so far of a run that is stepped; ``error`` is what has ended it."""
         clock = self.bound.clock
         return self._result(clock.tick, 0.0, error, [], Interrupts(clock, self.life))
 
@@ -281,7 +281,7 @@ class Executor:
             self._note("warning", warning, "WARN")
 
     def _add_warnings(self) -> None:
-        """The blocks' warnings that are not known yet, in the order of the blocks."""
+        """Add the warnings of the blocks that are new, in the order of the blocks."""
         for path, block in self.bound.blocks.items():
             known = set(self._warnings)
             texts = [f"{path}: {text}" for text in block.warnings()]
@@ -309,10 +309,13 @@ class Executor:
                 by_block[path] = dict(block.metrics())
             except Exception as failure:  # noqa: BLE001  # the other blocks' metrics still count
                 problems.append(f"block '{path}' failed in metrics: {describe(failure)}")
-        metrics, unmet, praise = merge_metrics(by_block)
+        metrics, unmet, success_reason = merge_metrics(by_block)
         judges = [path for path, of_block in by_block.items() if of_block.get("reason")]
-        unmet, praise = self._with_stop(unmet, judges), self._with_stop(praise, judges)
-        code, reason = self._verdict(error, problems, interrupts, unmet, praise)
+        unmet, success_reason = (
+            self._with_stop(unmet, judges),
+            self._with_stop(success_reason, judges),
+        )
+        code, reason = self._verdict(error, problems, interrupts, unmet, success_reason)
         for program in self.ticker.programs:
             program.fold()
         pacer = self.ticker.pacer
@@ -343,7 +346,8 @@ class Executor:
         return block_times(self.ticker.programs, path, self.ticker.overruns_by_block[path])
 
     def _with_stop(self, verdict: str | None, judges: Sequence[str]) -> str | None:
-        """What a score says, with why another block ended the run; a score knows its own reason."""
+        """Return a verdict, with the reason of another block that ended the run; a score knows its
+        own."""
         clock = self.bound.clock
         if verdict is None or not clock.stop_reason or clock.stopped_by in ("", *judges):
             return verdict
@@ -355,9 +359,9 @@ class Executor:
         problems: Sequence[str],
         interrupts: Interrupts,
         unmet: str | None,
-        praise: str | None,
+        success_reason: str | None,
     ) -> tuple[ExitCode, str]:
-        """The exit code and the reason; of several reasons, the gravest."""
+        """Return the exit code and the reason; of several reasons, the gravest."""
         stopped = self.bound.clock.stop_reason
         if error is not None and not isinstance(error.__cause__, KeyboardInterrupt):
             return ExitCode.RUN_FAILED, str(error)
@@ -370,13 +374,13 @@ class Executor:
             return ExitCode.RUN_FAILED, problems[0]
         if unmet is not None:
             return ExitCode.NOT_SUCCESSFUL, unmet
-        return ExitCode.SUCCESS, praise or stopped or "ran to its end"
+        return ExitCode.SUCCESS, success_reason or stopped or "ran to its end"
 
 
 @contextmanager
 def _collector_paused(*, collect: bool) -> Iterator[None]:
-    """Switch the garbage collector off within, and exempt all existing objects from collections that
-    are asked for, so that no collection interrupts a tick.
+    """Switch the garbage collector off within, and exempt all existing objects from requested
+    collections, so that no collection interrupts a tick.
 
     Where the caller, or Python at its start, has frozen objects already, they stay frozen and no
     others are: ``gc.unfreeze`` knows only all.

@@ -20,21 +20,21 @@ class Hang(BaseException):
 
 
 def describe(error: BaseException) -> str:
-    """The text of an error, with its type unless it was raised for users to read."""
+    """Format an error, with its type unless it was raised for users to read."""
     if isinstance(error, AloftError | Hang):
         return str(error)
     return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
 
 
-def place_of(error: BaseException) -> str:
+def location_of(error: BaseException) -> str:
     """``file:line`` of the user's statement that raised an error; empty where that is not known.
 
     An error raised inside a library, such as NumPy, is placed where the block called it.
     """
-    return place_of_frames(traceback.extract_tb(error.__traceback__))
+    return location_of_frames(traceback.extract_tb(error.__traceback__))
 
 
-def place_of_frames(frames: traceback.StackSummary) -> str:
+def location_of_frames(frames: traceback.StackSummary) -> str:
     """``file:line`` of the innermost statement that is the user's; empty if there is no frame."""
     own = [frame for frame in frames if not _is_installed(frame.filename)]
     best = (own or frames)[-1:]
@@ -42,7 +42,7 @@ def place_of_frames(frames: traceback.StackSummary) -> str:
 
 
 def _is_installed(file: str) -> bool:
-    """Whether a file belongs to Python, to an installed package or to the runtime itself."""
+    """Return whether a file belongs to Python, to an installed package or to the runtime itself."""
     return file.startswith(INSTALLED) or "site-packages" in Path(file).parts
 
 
@@ -50,7 +50,7 @@ def locate(error: RunError) -> RunError:
     """Note in an error where its cause was raised, and the whole traceback; give it back."""
     cause = error.__cause__
     if cause is not None and not error.traceback:
-        error.where = place_of(cause)
+        error.where = location_of(cause)
         error.traceback = "".join(traceback.format_exception(cause))
     return error
 
@@ -68,7 +68,7 @@ def blame(spec: BlockSpec, what: str) -> Iterator[None]:
     """Turn whatever a block raises before a run into one ``RunError`` that names the block.
 
     The message begins with the block's place in the graph file, where it has one. An error that was
-    not raised for users to read also says where in the code it was raised.
+    not raised for users to read also has the place in the code where it was raised.
 
     Raises:
         RunError: something was raised inside.
@@ -79,7 +79,7 @@ def blame(spec: BlockSpec, what: str) -> Iterator[None]:
         place = f"{spec.where}: " if spec.where is not None else ""
         reason = describe(error)
         if not isinstance(error, AloftError):
-            reason = f"{' '.join(reason.split())} (at {place_of(error)})"
+            reason = f"{' '.join(reason.split())} (at {location_of(error)})"
         failure = RunError(
             f"{place}block '{spec.path}' failed in {what}: {reason}", block=spec.path
         )

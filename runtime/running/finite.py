@@ -20,7 +20,7 @@ usual products are not subnormal, which would be slow."""
 
 
 class NotFiniteError(AloftError):
-    """A signal holds NaN or infinity; ``place`` says which, ``value`` what."""
+    """A signal holds NaN or infinity, ``value``, at ``place``."""
 
     def __init__(self, place: str, value: float) -> None:
         super().__init__(f"{place} is {value}")

@@ -30,10 +30,11 @@ ENDING = 10.0
 class FreezeGuard:
     """A sink that lets a process watch over this one, from the start of the blocks to their end.
 
-    Use it in a ``with`` statement, within which the signal SIGUSR1 writes the stacks of all threads.
+    Use it in a ``with`` statement, within which the signal SIGUSR1 writes the stacks of all
+    threads.
 
     Args:
-        graph: what runs; its blocks are named, and its clock says after how long a call hangs.
+        graph: what runs; its blocks are named, and its clock sets the time after which a call hangs.
         as_json: whether the process prints a JSON object, too, when it ends this one.
     """
 
@@ -74,7 +75,7 @@ class FreezeGuard:
         self._beats.start()
 
     def record(self, tick: int) -> None:
-        """Nothing to record: the beats come from a thread of their own."""
+        """Do nothing: the beats come from a thread of their own."""
 
     def close(self) -> None:
         """End the beats, once nothing can hang any more."""
@@ -92,8 +93,8 @@ class FreezeGuard:
 
 
 def _shared_number() -> tuple[int, NDArray[np.int64]]:
-    """An integer in memory that another process can read, (1,), and the file of that memory; where
-    the system has none, memory of this process, and -1."""
+    """Allocate an integer that another process can read, (1,), and return the file of its memory
+    with it; where the system has none, memory of this process, and -1."""
     try:
         file = nameless_memory(8, "aloft-running")
         return file, np.frombuffer(mmap(file, 8), np.int64)
@@ -102,7 +103,7 @@ def _shared_number() -> tuple[int, NDArray[np.int64]]:
 
 
 def _describe_graph(graph: CheckedGraph) -> dict[str, object]:
-    """What names a block: the file and the class of each, for stacks, and their order."""
+    """Describe the blocks: the file and the class of each, for stacks, and their order."""
     blocks = []
     for spec in graph.blocks:
         module = sys.modules.get(spec.block_type.__module__)

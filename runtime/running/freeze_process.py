@@ -1,10 +1,11 @@
-"""The program beside a run that ends it where compiled code keeps the interpreter to itself.
+"""Separate program that ends a run whose compiled code does not release the interpreter.
 
-Such code (an endless loop in a solver, or in a function compiled to machine code) lets no thread of Python
-run, so nothing in the process of the run can help. This process hears a beat from a thread there.
-When the beats stop, it asks with a signal for the stacks of all threads, which Python's fault
-handler writes without the interpreter, says which block hangs and where, and kills the process. It
-counts its own looks instead of reading a clock, so that a suspended process does not seem to hang.
+Such code (an endless loop in a solver, or in a function compiled to machine code) lets no thread of
+Python run, so nothing in the process of the run can help. This process hears a beat from a thread
+there. When the beats stop, it asks with a signal for the stacks of all threads, which Python's
+fault handler writes without the interpreter, reports which block hangs and where, and kills the
+process. It counts its own looks instead of reading a clock, so that a suspended process does not
+seem to hang.
 
 It knows nothing of aloft, so it starts fast, and nothing that the graph imports can fail in it::
 
@@ -64,13 +65,15 @@ def main() -> int:
 
 
 def _read(seconds: float) -> bytes | None:
-    """What comes in within that time: nothing yet, or empty at the end of the pipe."""
+    """Read the data that come within that time: ``None`` if there are none, empty at the end of the
+    pipe."""
     ready, _, _ = select.select([0], [], [], seconds)
     return os.read(0, 1 << 16) if ready else None
 
 
 def _stacks(pid: int) -> str:
-    """The stacks of all threads; empty where the process is suspended, or goes on after all."""
+    """Return the stacks of all threads; empty where the process is suspended, or goes on after
+    all."""
     with suppress(ProcessLookupError):
         os.kill(pid, signal.SIGUSR1)
     text = b""
@@ -123,7 +126,8 @@ def _is_installed(file: str, description: dict[str, object]) -> bool:
 
 
 def _blocks(description: dict[str, object], frames: list[tuple[str, int, str]]) -> list[str]:
-    """The paths of the blocks whose class has the outermost frame that belongs to a block."""
+    """Return the paths of the blocks whose class has the outermost frame that belongs to a
+    block."""
     known = description["blocks"]
     assert isinstance(known, list)
     for file, line, _ in reversed(frames):
@@ -135,7 +139,7 @@ def _blocks(description: dict[str, object], frames: list[tuple[str, int, str]]) 
 
 
 def _in_chain(description: dict[str, object], frames: list[tuple[str, int, str]]) -> list[str]:
-    """The path of the block that a chain runs, if the innermost frame is a chain's."""
+    """Return the path of the block that a chain runs, if the innermost frame is a chain's."""
     order, shared = description["order"], int(sys.argv[5])
     assert isinstance(order, list)
     if shared < 0 or not frames or frames[0][2] != "run" or "chain.py" not in frames[0][0]:
@@ -145,7 +149,7 @@ def _in_chain(description: dict[str, object], frames: list[tuple[str, int, str]]
 
 
 def _class_at(file: str, line: int) -> str:
-    """The name of the class whose text has that line."""
+    """Return the name of the class whose text has that line."""
     try:
         with open(file, encoding="utf-8") as source:
             tree = ast.parse(source.read())

@@ -18,7 +18,7 @@ STOP_CYCLES = 5
 
 
 class LifeState(Enum):
-    """Where a graph is in its life."""
+    """State of a graph in its life."""
 
     IDLE = "idle"
     """Bound; nothing is open."""
@@ -28,7 +28,7 @@ class LifeState(Enum):
     STOPPING = "stopping"
     """Stop cycles go out."""
     STOPPED = "stopped"
-    """Everything is closed."""
+    """All blocks are closed."""
 
 
 _NEXT: Mapping[LifeState, tuple[LifeState, ...]] = {

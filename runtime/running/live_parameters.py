@@ -60,7 +60,7 @@ class LiveParameters:
         """Compiles the calls of kernels that a block makes anew; none in a plain run."""
 
     def answer(self, tick: int) -> None:
-        """Apply the adjustment in the slot, from ``tick`` on, or do what the command in it says; only
+        """Apply the adjustment in the slot, from ``tick`` on, or execute the command in it; only
         the control thread does this."""
         try:
             request = self.requests.popleft()

@@ -1,5 +1,5 @@
-"""What `aloft doctor` examines: whether the machine lets a control loop keep its deadlines, and whether
-the compiled libraries that a run needs can be loaded."""
+"""Checks of ``aloft doctor``: whether the machine lets a control loop keep its deadlines, and
+whether the compiled libraries that a run needs can be loaded."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Finding:
     change: str = ""
 
     def as_json(self) -> dict[str, Any]:
-        """The finding as plain data."""
+        """Return the finding as plain data."""
         return asdict(self)
 
 
@@ -142,7 +142,7 @@ def _swap(system: Path) -> Finding:
 
 
 def _read(path: Path) -> str:
-    """What the kernel says in one of its files; empty where there is none."""
+    """Read one of the kernel's files; empty where there is none."""
     try:
         return path.read_text(encoding="utf-8").strip()
     except OSError:
@@ -163,8 +163,8 @@ LIBRARIES = {
 }
 """The packages of a run that hold machine code, and the names they are imported by."""
 
-IN_EXTRAS = frozenset({"casadi", "eclipse-zenoh"})
-"""Those that only extras bring, so that they may be missing."""
+IN_EXTRAS = frozenset({"casadi"})
+"""Packages that only extras bring, so that they may be missing."""
 
 SYSTEM_PACKAGES = {"libgomp.so.1": "libgomp1", "libstdc++.so.6": "libstdc++6"}
 """Debian's packages of the shared libraries that the wheels expect of the system."""

@@ -43,7 +43,7 @@ class Region:
         }
 
     def field(self, name: str, *, writable: bool = True) -> NDArray[Any]:
-        """The view of the slot ``block.port.field``. Raises ``KeyError``."""
+        """Return the view of the slot ``block.port.field``. Raises ``KeyError``."""
         slot = self.layout.slots[name]
         flat = self.sections[slot.section][slot.start : slot.start + slot.size]
         view = flat.reshape(slot.shape)
@@ -53,7 +53,7 @@ class Region:
     def signal(
         self, signal: type[Signal], port: str, *, writable: bool = True, source: str = ""
     ) -> Signal:
-        """The fields of ``signal`` bound to the slots of ``source`` (by default of ``port``)."""
+        """Bind the fields of ``signal`` to the slots of ``source`` (by default of ``port``)."""
         start = source or port
         return signal.bind(
             {name: self.field(f"{start}.{name}", writable=writable) for name in signal.fields}
@@ -61,7 +61,8 @@ class Region:
 
 
 def _allocate(layout: Layout, what: str) -> Region:
-    """The memory of a layout. Raises ``RunError`` if it needs more than a graph may have."""
+    """Allocate the memory of a layout. Raises ``RunError`` if it needs more than a graph may
+    have."""
     try:
         if layout.size <= LARGEST:
             return Region(layout)
@@ -77,7 +78,7 @@ def _allocate(layout: Layout, what: str) -> Region:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Everything a graph remembers at one instant: bus, declared state and tick."""
+    """State of a graph at one instant: bus, declared state and tick."""
 
     tick: int
     bus: bytes
@@ -166,7 +167,7 @@ class Memory:
         bind_steps(block)
 
     def snapshot(self, tick: int) -> Snapshot:
-        """A copy of both buffers."""
+        """Return a copy of both buffers."""
         return Snapshot(tick, self.bus.buffer.tobytes(), self.state.buffer.tobytes())
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -196,7 +197,7 @@ class BoundGraph:
 
     clock_type: type[Clock] = Clock
     machine = ""
-    """Whose part of a graph on several machines this is; empty for a whole graph."""
+    """Machine whose part of a graph this is; empty for a whole graph."""
 
     def __init__(self, graph: CheckedGraph, clock: Clock | None = None) -> None:
         self.graph = graph
@@ -230,7 +231,7 @@ class BoundGraph:
         return block
 
     def snapshot(self) -> Snapshot:
-        """Everything the graph remembers now, after every block's ``save_state``."""
+        """Return the whole state of the graph now, after every block's ``save_state``."""
         for block in self.blocks.values():
             block.save_state()
         return self.memory.snapshot(self.clock.tick)
@@ -250,7 +251,8 @@ class BoundGraph:
 
 
 def nameless_memory(size: int, name: str) -> int:
-    """A file descriptor of ``size`` zero bytes that two processes can share.
+    """Make memory of ``size`` zero bytes that two processes can share, and return its file
+    descriptor.
 
     On Linux it is a ``memfd``, elsewhere a file that is deleted at once. So a process that is killed
     leaves nothing behind, and the other one keeps what had been written. ``name`` is what the

@@ -1,4 +1,4 @@
-"""Decides when a tick may begin: at once, at a deadline of wall time, or when the robot says so."""
+"""Decides when a tick may begin: at once, at a deadline of wall time, or with the robot's data."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ usually takes, and short enough to leave the processor to others most of the tim
 
 
 class TimeSource(Protocol):
-    """Where the time comes from; tests have one of their own."""
+    """Source of time; tests have one of their own."""
 
     def now(self) -> int:
         """Nanoseconds since some fixed instant."""
@@ -110,7 +110,7 @@ class DrivesClock(Protocol):
 
 
 class RobotDriven:
-    """Lets ticks begin when the robot says so: the graph's only block with a ``wait`` method."""
+    """Begins ticks when the robot is ready: by the graph's only block with a ``wait`` method."""
 
     def __init__(self, block: Block, rate: float) -> None:
         self.overruns = self.skipped_periods = self.in_a_row = self.missed_deadline = 0
@@ -127,11 +127,11 @@ class RobotDriven:
         return int(missed * 1e9 / self._rate)
 
     def restart(self) -> None:
-        """Nothing to do: a run that a robot drives is not paused."""
+        """Do nothing: a run that a robot drives is not paused."""
 
 
 def driving_block(bound: BoundGraph) -> Block:
-    """The block that drives the clock. Raises ``AloftError`` unless there is exactly one."""
+    """Find the block that drives the clock. Raises ``AloftError`` unless there is exactly one."""
     found = [path for path, block in bound.blocks.items() if hasattr(block, "wait")]
     if len(found) != 1:
         raise AloftError(
@@ -142,7 +142,7 @@ def driving_block(bound: BoundGraph) -> Block:
 
 
 def make_pacer(spec: ClockSpec, bound: BoundGraph, source: TimeSource) -> Pacer | None:
-    """The pacer of a graph; none for a free-running one. Raises ``AloftError``."""
+    """Make the pacer of a graph; none for a free-running one. Raises ``AloftError``."""
     if spec.kind == "paced":
         return Paced(bound.graph.base_rate, source)
     if spec.kind == "robot":

@@ -57,7 +57,7 @@ _TYPES: dict[type[Block], type[PlaybackBlock]] = {}
 
 
 def playback_block_type(block_type: type[Block]) -> type[PlaybackBlock]:
-    """The stand-in for blocks of that type."""
+    """Return the stand-in for blocks of that type."""
     if block_type in _TYPES:
         return _TYPES[block_type]
     base = _PlaybackMoore if block_type.is_moore() else _PlaybackMealy
@@ -69,7 +69,7 @@ def playback_block_type(block_type: type[Block]) -> type[PlaybackBlock]:
 
 
 def playback_graph(graph: CheckedGraph, paths: Iterable[str]) -> CheckedGraph:
-    """The same graph with the blocks at ``paths`` replaced by stand-ins.
+    """Return the same graph with the blocks at ``paths`` replaced by stand-ins.
 
     The bus keeps its layout, and the order of execution stays what it was.
     """

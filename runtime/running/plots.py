@@ -28,7 +28,7 @@ class Logged(Protocol):
         """The time of every tick [s], (ticks,)."""
 
     def signals(self) -> tuple[str, ...]:
-        """The names that ``signal`` knows."""
+        """Return the names that ``signal`` knows."""
 
     def signal(self, name: str) -> NDArray[Any]:
         """All values of ``block.output.field``, (ticks, ...)."""
@@ -51,11 +51,11 @@ class SignalPlot:
         return self.svg()
 
     def svg(self) -> str:
-        """The text of an SVG file."""
+        """Return the text of an SVG file."""
         return panels_svg(self.panels, self.title)
 
     def save(self, path: str | Path) -> None:
-        """Write it into a file, as its ending says: ``.svg`` or ``.png``.
+        """Write the plot into a file, in the format of its ending: ``.svg`` or ``.png``.
 
         Raises:
             ValueError: it is another ending.
@@ -102,8 +102,8 @@ def plot_signals(
 def _declared(
     graph: CheckedGraph | None, name: str, shape: tuple[int, ...]
 ) -> tuple[str, list[str], tuple[str, ...]]:
-    """The unit of a field, the name of each of its elements, and the names of its rows if they have
-    any. Of a result without its graph, as after pickling, only numbers are known."""
+    """Return the unit of a field, the name of each of its elements, and the names of its rows if
+    they have any. Of a result without its graph, as after pickling, only numbers are known."""
     numbers = [", ".join(map(str, place)) for place in np.ndindex(*shape)]
     path, _, rest = name.partition(".")
     spec = None if graph is None else next((s for s in graph.blocks if s.path == path), None)
@@ -120,7 +120,7 @@ def _declared(
 
 
 def _field(spec: BlockSpec, name: str) -> Field | None:
-    """The declaration of ``port.field`` among a block's ports."""
+    """Return the declaration of ``port.field`` among a block's ports."""
     port, _, key = name.partition(".")
     found = {**spec.block_type.inputs, **spec.block_type.outputs}.get(port)
     return None if found is None else found.signal.fields.get(key)

@@ -1,6 +1,6 @@
-"""What the control thread asks of the operating system while it ticks: a processor, a priority, memory.
+"""Requests of the control thread to the operating system: a processor, a priority, memory.
 
-Everything is asked for just before the first tick and given back after the last one, so that
+Everything is requested just before the first tick and given back after the last one, so that
 threads that blocks and recorders have started before keep what they have.
 """
 
@@ -27,7 +27,7 @@ class RealTimeError(AloftError):
 
 @dataclass(frozen=True)
 class RealTimeOptions:
-    """What a run asks for.
+    """Requests of a run to the operating system.
 
     Attributes:
         cpu: the only processor that the control thread may use; none: any.
@@ -40,10 +40,10 @@ class RealTimeOptions:
     lock_memory: bool = False
 
     def check(self) -> None:
-        """Ask for everything once and give it back, before anything moves.
+        """Request everything once and give it back, before anything moves.
 
         Raises:
-            RealTimeError: something is refused; the text says what and what helps.
+            RealTimeError: something is refused; the text names it and the remedy.
         """
         with self._granted(_LOCK_ALL | _ON_FAULT):
             pass

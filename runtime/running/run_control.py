@@ -1,9 +1,9 @@
 """Pauses a simulated run, takes it back to a snapshot that was kept, and lets it go on from there.
 
-While the run goes on its whole memory is copied at a regular interval into a block of memory that is made
-before the first tick and has room for some dozens of copies; the oldest makes room for the newest. Commands
-come from other threads by the slot that changes of parameters use, so a run that nobody pauses pays for
-the copies only, and computes the same bytes.
+While the run goes on its whole memory is copied at a regular interval into a block of memory that
+is made before the first tick and holds some dozens of copies; the newest replaces the oldest.
+Commands come from other threads by the slot that changes of parameters use, so a run that nobody
+pauses pays for the copies only, and computes the same bytes.
 
 A snapshot has everything that the run depends on: signals, states, parameters and the run hash so far. A run
 that goes on from one unchanged is the uninterrupted one to the byte. Snapshots of later ticks are forgotten when
@@ -42,7 +42,7 @@ POLL = 0.01
 
 @dataclass(frozen=True)
 class _Kept:
-    """What one snapshot has beside its bytes in row ``row`` of the memory."""
+    """Data of one snapshot beside its bytes in row ``row`` of the memory."""
 
     tick: int
     row: int
@@ -112,7 +112,7 @@ class RunControl:
 
     @property
     def paused(self) -> bool:
-        """Whether the run stands still because somebody has paused it."""
+        """True if the run stands still because a user has paused it."""
         return not self.refusal and self._ticker.paused
 
     # What the control thread calls.
@@ -156,7 +156,7 @@ class RunControl:
 
     @property
     def ticks(self) -> int | None:
-        """How many ticks to run next; ``None``: until something ends the run."""
+        """Number of ticks to run next; ``None``: until something ends the run."""
         ends = [end for end in (self._end, self._until) if end is not None]
         return min(ends) - self._bound.clock.tick if ends else None
 
@@ -248,7 +248,7 @@ class RunControl:
         return self._bound.clock.tick
 
     def about(self) -> dict[str, Any]:
-        """How the run stands, as plain data.
+        """Return the state of the run, as plain data.
 
         Returns:
             ``paused``; ``tick``, which runs next; ``kept``, the ticks of all snapshots; ``room``, how
@@ -326,7 +326,7 @@ class RunControl:
 
 
 def refusal_of(bound: BoundGraph) -> str:
-    """Why a run cannot be paused; empty where it can be."""
+    """Return the reason why a run cannot be paused; empty where it can be."""
     if bound.machine:
         return (
             f"this run cannot be paused: it is the part on {bound.machine} of a graph on several "

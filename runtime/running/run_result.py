@@ -52,7 +52,7 @@ class RunResult:
     error: RunError | None = None
     stop_problems: tuple[str, ...] = ()
     block_warnings: tuple[str, ...] = ()
-    """What the blocks warn readers of the result of, such as a check that was waived."""
+    """Warnings of the blocks to readers of the result, such as of a check that was waived."""
     parameter_changes: tuple[ParameterChange, ...] = ()
     warnings: tuple[str, ...] = ()
     """Problems beside the run itself, such as a recording that is not complete."""
@@ -69,7 +69,8 @@ class RunResult:
         )
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled: all but the graph, whose blocks are code that another process may lack."""
+        """Return the state to pickle: all but the graph, whose blocks are code that another process
+        may lack."""
         return {**self.__dict__, "graph": None}
 
     def _repr_html_(self) -> str:
@@ -129,7 +130,7 @@ class RunResult:
         return plot_signals(self, signals, start, end)
 
     def signals(self) -> tuple[str, ...]:
-        """The names that ``signal`` knows."""
+        """Return the names that ``signal`` knows."""
         log = self._recorded()
         assert log.layout is not None
         return tuple(log.layout.slots)
@@ -145,7 +146,8 @@ class RunResult:
             raise self.error
 
     def to_json(self) -> dict[str, Any]:
-        """The result as plain data for ``json.dumps``; numbers that are not finite become null."""
+        """Return the result as plain data for ``json.dumps``; numbers that are not finite become
+        null."""
         return {
             "success": self.success,
             "reason": self.reason,
@@ -191,20 +193,20 @@ def merge_metrics(
     by_block = dict(sorted(by_block.items(), key=lambda item: "success" not in item[1]))
     owners: dict[str, list[str]] = {}
     failure: str | None = None
-    praise: str | None = None
+    success_reason: str | None = None
     for path, metrics in by_block.items():
         for name in metrics:
             owners.setdefault(name, []).append(path)
         if failure is None and not metrics.get("success", True):
             failure = str(metrics.get("reason") or f"block '{path}' reports no success")
-        elif praise is None and metrics.get("success") and metrics.get("reason"):
-            praise = str(metrics["reason"])
+        elif success_reason is None and metrics.get("success") and metrics.get("reason"):
+            success_reason = str(metrics["reason"])
     merged: dict[str, Metric] = {}
     for path, metrics in by_block.items():
         for name, value in metrics.items():
             if name not in ("success", "reason"):
                 merged[name if len(owners[name]) == 1 else f"{path}.{name}"] = value
-    return merged, failure, praise
+    return merged, failure, success_reason
 
 
 @runtime_checkable

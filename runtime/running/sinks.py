@@ -49,7 +49,7 @@ class SupportsNotes(Protocol):
 
 
 def parameter_note(change: ParameterChange) -> Note:
-    """The note of a live change; its ``data`` are the attributes of the change."""
+    """Make the note of a live change; its ``data`` are the attributes of the change."""
     text = f"{change.path}: {change.old} -> {change.new}"
     return Note(change.tick, "parameter", text, data=asdict(change))
 
@@ -85,7 +85,7 @@ class SupportsResume(Protocol):
     """The method that a sink has if it measures time, for a run that is paused."""
 
     def resume(self, tick: int) -> None:
-        """The run has stood still, and goes on with ``tick``."""
+        """Continue with ``tick``, after the run has stood still."""
 
 
 @runtime_checkable
@@ -117,10 +117,10 @@ class RunHash:
         self._hash.update(self._bus)
 
     def close(self) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
     def kept(self) -> RunHash:
-        """A copy of the hash so far, for ``go_on_from``."""
+        """Return a copy of the hash so far, for ``go_on_from``."""
         copy = RunHash()
         copy._hash = self._hash.copy()
         return copy
@@ -130,7 +130,7 @@ class RunHash:
         self._hash = kept._hash.copy()
 
     def hexdigest(self) -> str:
-        """The hash so far, 32 hexadecimal digits."""
+        """Return the hash so far, 32 hexadecimal digits."""
         return self._hash.hexdigest()
 
 
@@ -138,7 +138,7 @@ class MemoryLog:
     """Every tick of the bus in memory."""
 
     CHUNK = 1024
-    """Ticks to make room for whenever the number of ticks is not known or has been exceeded."""
+    """Ticks by which the memory grows whenever their number is not known or has been exceeded."""
 
     def __init__(self) -> None:
         self._expected: int | None = None
@@ -149,11 +149,11 @@ class MemoryLog:
         self.layout: Layout | None = None
 
     def expect(self, ticks: int | None) -> None:
-        """Say, before ``open``, how many ticks to make room for; recording more is no error."""
+        """Set, before ``open``, the number of ticks to allocate for; recording more is no error."""
         self._expected = ticks
 
     def open(self, bound: BoundGraph) -> None:
-        """Make room for the ticks and forget those of an earlier run."""
+        """Allocate memory for the ticks and forget those of an earlier run."""
         self.layout = bound.memory.bus.layout
         self._bus = bound.memory.bus.buffer.data
         self._size = bound.memory.bus.buffer.size
@@ -189,10 +189,10 @@ class MemoryLog:
         self.notes.append(note)
 
     def close(self) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
     def __getstate__(self) -> dict[str, Any]:
-        """What was recorded, without the views of memory that only a run needs."""
+        """Return the recording, without the views of memory that only a run needs."""
         kept = {"_expected": None, "_chunks": [self.rows()], "_used": len(self.ticks)}
         return {**kept, "ticks": self.ticks, "notes": self.notes, "layout": self.layout}
 

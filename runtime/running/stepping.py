@@ -31,7 +31,8 @@ from .sinks import Sink
 
 
 class SteppedRun:
-    """One run of a graph, as fast as it is asked to step. Use it in a ``with`` statement.
+    """One run of a graph, stepped on demand and as fast as possible. Use it in a ``with``
+    statement.
 
     Leaving the statement sends the stop cycles and closes all blocks, whatever has happened.
 
@@ -76,7 +77,7 @@ class SteppedRun:
 
     @property
     def tick(self) -> int:
-        """How many ticks have been run since the start or the last reset."""
+        """Number of ticks run since the start or the last reset."""
         return self._bound.clock.tick
 
     @property
@@ -86,7 +87,7 @@ class SteppedRun:
 
     @property
     def reason(self) -> str:
-        """Why the run has ended; empty while it may go on."""
+        """Reason why the run has ended; empty while it may go on."""
         if self._bound.clock.stop_reason is not None:
             return self._bound.clock.stop_reason
         if self.graph.ticks is not None and self.tick >= self.graph.ticks:
@@ -122,14 +123,15 @@ class SteppedRun:
         self._ticker.refresh_chains()
 
     def result(self, error: RunError | None = None) -> RunResult:
-        """The outcome of what has run so far, as of a run that ends here; ``error`` has ended it.
+        """Return the outcome of what has run so far, as of a run that ends here; ``error`` has
+        ended it.
 
         The stop cycles come after it.
         """
         return self._executor.result(error)
 
     def snapshot(self) -> Snapshot:
-        """Everything that the graph remembers now."""
+        """Return the whole state of the graph now."""
         self._must_be_open()
         return self._bound.snapshot()
 
@@ -143,11 +145,12 @@ class SteppedRun:
         self._bound.restore(snapshot)
 
     def block(self, path: str) -> Block:
-        """The block at that path, for tools that know what it is. Raises ``KeyError``."""
+        """Return the block at that path, for tools that know what it is. Raises ``KeyError``."""
         return self._bound.blocks[path]
 
     def __getitem__(self, name: str) -> Any:
-        """A copy of a signal (``"pd.command"``) or of one of its fields (``"pd.command.torque"``).
+        """Return a copy of a signal (``"pd.command"``) or of one of its fields
+        (``"pd.command.torque"``).
 
         Raises:
             KeyError: there is none of that name; the text has the nearest.

@@ -29,7 +29,7 @@ from .timing import Program
 
 
 class Pauses(Protocol):
-    """What may pause a run between two ticks; see ``run_control``."""
+    """Pauses of a run between two ticks; see ``run_control``."""
 
     def begin(self, ticks: int | None, interrupted: Callable[[], bool]) -> None:
         """All blocks have started, and there are so many ticks to run."""
@@ -39,7 +39,7 @@ class Pauses(Protocol):
 
     @property
     def ticks(self) -> int | None:
-        """How many ticks to run next."""
+        """Number of ticks to run next."""
 
 
 class Ticker:
@@ -90,7 +90,8 @@ class Ticker:
         self.paused = False
 
     def _make_programs(self) -> tuple[list[Program], list[Program]]:
-        """The different programs, and for each tick of the hyperperiod the program it runs."""
+        """Return the different programs, and for each tick of the hyperperiod the program it
+        runs."""
         graph = self.bound.graph
         specs = [graph.block(path) for path in graph.order]
         programs: dict[tuple[int, ...], Program] = {}
@@ -146,7 +147,8 @@ class Ticker:
     def _in_chains(
         self, active: Sequence[str], which: Calls = "kernel_calls"
     ) -> list[tuple[str, Chain | None]]:
-        """The blocks, those that follow each other in a chain only once, with their chain."""
+        """Return the blocks, those that follow each other in a chain only once, with their
+        chain."""
         blocks, numbers = self.bound.blocks, {p: k for k, p in enumerate(self.bound.graph.order)}
         found: list[tuple[str, Chain | None]] = []
         pieces = groupby(active, lambda path: self._fused and can_be_chained(blocks[path], which))
@@ -163,11 +165,11 @@ class Ticker:
     def advance(self, ticks: int | None = None) -> int:
         """Run up to ``ticks`` ticks, or without a limit until stopped. Returns how many were run.
 
-        The blocks must have been started by the caller. The run ends early when a block or a
-        signal (SIGINT, SIGTERM) asks it to stop, or when it is paused.
+        The blocks must have been started by the caller. The run ends early when a block or a signal
+        (SIGINT, SIGTERM) requests it, or when it is paused.
 
         Raises:
-            RunError: a block failed, a value is not finite or the overrun policy says stop.
+            RunError: a block failed, a value is not finite or the overrun policy is to stop.
         """
         clock = self.bound.clock
         first = tick = clock.tick
@@ -250,7 +252,7 @@ class Ticker:
         return RunError(text, block=block, tick=tick)
 
     def instant(self, tick: int) -> str:
-        """How reports name a tick."""
+        """Name a tick for reports."""
         return f"tick {tick} ({tick * self.bound.clock.base_period:.3f} s)"
 
     def tell(self, note: Note) -> None:
@@ -262,7 +264,7 @@ class Ticker:
     def _count_overrun(self, tick: int, late: int) -> None:
         """Count an overrun for the block that ran when the deadline of ``tick`` passed.
 
-        Raises ``RunError`` where the overrun policy says to stop.
+        Raises ``RunError`` where the overrun policy is to stop.
         """
         pacer = self.pacer
         assert pacer is not None
@@ -287,7 +289,8 @@ class Ticker:
 
 
 def owner_of(call: Callable[..., Any] | None) -> object:
-    """The block that makes a call, or the part of the runtime; of a chain the block that runs."""
+    """Return the block that makes a call, or the part of the runtime; of a chain the block that
+    runs."""
     owner: object = getattr(call, "__self__", None)
     if isinstance(owner, RobotDriven):
         return owner.block
@@ -303,7 +306,7 @@ class SupportsTicker(Protocol):
 
 
 def hang_text(who: str, instant: str, limit: float) -> str:
-    """What is said of a call that did not return."""
+    """Describe a call that did not return."""
     return (
         f"{who} hung at {instant}: it did not return within {limit:g} s "
         "(clock.hangs_after allows longer)"

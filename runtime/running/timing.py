@@ -26,8 +26,9 @@ KEPT_TICKS = 2048
 
 FIRST_TIMED = 1024
 TIMED_EVERY = 32
-"""Where no deadline is watched, the first runs of a phase with chains are all timed, and then every so
-many: reading the clock takes several times as long as a small block."""
+"""Interval of timed runs: where no deadline is watched, the first runs of a phase with chains are
+all timed, and then one in this many: reading the clock takes several times as long as a small
+block."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,8 @@ class Program:
         self.columns = {owner: column for owner, column in met.items() if owner}
 
     def times_this_run(self) -> bool:
-        """Whether the run that begins now is timed; if it is not, its chains read no clock."""
+        """Return whether the run that begins now is timed; if it is not, its chains read no
+        clock."""
         self._runs += 1
         timed = self._runs <= FIRST_TIMED or self._runs % TIMED_EVERY == 0
         self._place_value[0] = self._base + self._cursor if timed else 0
@@ -156,12 +158,13 @@ class Program:
         self.ticks += rows
 
     def running_at(self, instant: int) -> str:
-        """The owner of the call that ran at ``instant`` [ns] of the last stamped tick."""
+        """Return the owner of the call that ran at ``instant`` [ns] of the last stamped tick."""
         ends = self._stamps[self._cursor // self._row - 1, self._ends].tolist()
         return next((o for o, end in zip(self.owners, ends, strict=True) if end > instant), "")
 
     def times(self, block: str) -> tuple[int, int, int, NDArray[np.int64]]:
-        """A block's times in this phase: runs, total and longest [ns], and the kept times [ns].
+        """Return a block's times in this phase: runs, total and longest [ns], and the kept times
+        [ns].
 
         The total of all runs follows from those that were timed.
         """
@@ -172,7 +175,8 @@ class Program:
 
 
 def _columns(owners: Sequence[str | Chain]) -> tuple[list[int], list[int], list[str]]:
-    """For every block's run in a tick the places of the stamps before and after it, and its path.
+    """Return, for every block's run in a tick, the places of the stamps before and after it, and
+    its path.
 
     The places before ``len(owners) + 1`` are those of the stamps that the executor takes.
     """
@@ -208,8 +212,8 @@ def block_times(programs: Sequence[Program], block: str, overruns: int = 0) -> B
 def times_of(
     kept: NDArray[np.int64], calls: int, total: int, longest: int, overruns: int = 0
 ) -> BlockTimes:
-    """The times of a block that were taken elsewhere: the last ones, and of all runs their number,
-    total and longest; all in ns."""
+    """Return the times of a block that were taken elsewhere: the last ones, and of all runs their
+    number, total and longest; all in ns."""
     if not calls:
         return BlockTimes(overruns=overruns)
     return _times(calls, total, longest, kept, np.ones(len(kept)), overruns)
@@ -245,4 +249,4 @@ class SupportsTimes(Protocol):
     """The method of a block that computes elsewhere, and takes its times there."""
 
     def worker_times(self) -> BlockTimes:
-        """The times of its runs."""
+        """Return the times of its runs."""

@@ -27,7 +27,7 @@ from typing import Any, Self
 
 from ..language.block import Block, Clock
 from ..language.errors import RunError
-from .failures import Hang, place_of_frames
+from .failures import Hang, location_of_frames
 from .life_cycle import STOP_CYCLES, LifeCycle, LifeState
 from .pacing import Paced
 from .ticker import Ticker, hang_text, owner_of
@@ -68,7 +68,7 @@ class Interrupts:
     def interrupt_hang(self, *, again: bool) -> None:
         """Raise ``Hang`` in the main thread, inside the call that is under way there.
 
-        ``again`` says that the call has had one before, and is still under way.
+        ``again`` is true if the call has had one before, and is still under way.
         """
         if self._before:
             self._hang = True
@@ -98,9 +98,9 @@ class Interrupts:
 
 
 LOOKS = 8
-"""How often the watchdog looks at the run in every limit of time."""
+"""Number of times that the watchdog looks at the run in every time limit."""
 TRIES = 3
-"""How often it interrupts a call before the run is abandoned: a block may catch what it gets."""
+"""Number of interrupts of a call before the run is abandoned: a block may catch what it gets."""
 _SLOW_MODULES = ("llvmlite.", "importlib.", "bdb", "pdb", "pydevd", "_pydevd_bundle")
 """Modules in which a call may stay for long: a compiler, an import, a debugger."""
 
@@ -169,7 +169,7 @@ class Watchdog:
             self._interrupt(again=tries > 1)
 
     def _note(self, call: tuple[int, str]) -> None:
-        """The run ends also where the call catches what interrupts it, and returns."""
+        """Mark the run to end, also where the call catches what interrupts it and returns."""
         clock = self._ticker.bound.clock
         who = f"block '{call[1]}'" if call[1] else "the runtime"
         text = hang_text(who, self._ticker.instant(clock.tick), self._limit)
@@ -178,8 +178,8 @@ class Watchdog:
             clock.stop_reason = text
 
     def _call(self) -> tuple[int, str] | None:
-        """What tells the call under way from all others, and its block; nothing if there is none
-        that could hang."""
+        """Return the identity of the call under way, and its block; ``None`` if there is none that
+        could hang."""
         stopping = self._life.state is LifeState.STOPPING
         if not stopping and self._life.state is not LifeState.RUNNING:
             return None
@@ -215,7 +215,7 @@ class Watchdog:
 
     def _give_up(self, call: tuple[int, str]) -> None:
         stack = traceback.extract_stack(sys._current_frames()[self._watched])
-        place = place_of_frames(stack)
+        place = location_of_frames(stack)
         self._abandon(call[1], place, "".join(traceback.format_list(stack)))
 
 

@@ -116,7 +116,7 @@ class _Counter:
             )
 
     def _counts(self) -> bool:
-        """Whether one array of a known size is counted as one."""
+        """Return whether one array of a known size is counted as one."""
         self.current = found = Allocations()
         before = self.install()
         try:

@@ -130,7 +130,7 @@ class BlockBench(Generic[B]):
             view[...] = given
 
     def get(self, port: str) -> Any:
-        """The signal of an output, an input or a state: views, which the next step changes.
+        """Return the signal of an output, an input or a state: views, which the next step changes.
 
         Raises:
             KeyError: there is no such port.
@@ -157,11 +157,11 @@ class BlockBench(Generic[B]):
 
     @property
     def stop_reason(self) -> str | None:
-        """Why the block asked for the run to end, if it did."""
+        """Reason why the block requested the end of the run; ``None`` if it did not."""
         return self.clock.stop_reason
 
     def snapshot(self) -> Snapshot:
-        """A copy of the block's state and ports, and the tick."""
+        """Copy the block's state and ports, and the tick."""
         self.block.save_state()
         return self.memory.snapshot(self.clock.tick)
 

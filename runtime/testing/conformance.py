@@ -53,7 +53,7 @@ WARM_UP = 3
 
 
 class ConformanceError(AssertionError):
-    """A block breaks a promise; the message says which and how."""
+    """A block breaks a promise, which the message names."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Subject:
     """Closes all benches: a block may hold a device or a thread."""
 
     def bench(self, *, plain: bool = False) -> BlockBench[Block]:
-        """A new instance of the block, on a bench of its own."""
+        """Make a new instance of the block, on a bench of its own."""
         bench = BlockBench(
             self.block_type,
             self.params,
@@ -107,7 +107,7 @@ class Subject:
 
 
 def _documented(subject: Subject) -> None:
-    """The block has a docstring of its own, and every port and parameter has a text."""
+    """Check that the block has a docstring of its own, and every port and parameter a text."""
     kind = subject.block_type
     subject.expect(bool((kind.__doc__ or "").strip()), "no docstring")
     subject.expect(kind.__doc__ != Block.__doc__, "no docstring of its own")
@@ -169,7 +169,8 @@ def _outputs_written(subject: Subject) -> None:
 
 
 def _set_up_once(subject: Subject, port: str, name: str, value: bytes) -> bool:
-    """Whether ``setup`` writes a field of an output, and no run changes it from this value."""
+    """Return whether ``setup`` writes a field of an output, and no run changes it from this
+    value."""
     bench = subject.bench(plain=True)
     view = bench.get(port).views()[name]
     if view.tobytes() != value:
@@ -201,7 +202,7 @@ def _bounds(subject: Subject) -> None:
 
 
 def _inputs_kept(subject: Subject) -> None:
-    """The block does not write its inputs."""
+    """Check that the block does not write its inputs."""
     bench = subject.bench()
     for _ in subject.feed(bench, TICKS):
         before = {port: [v.tobytes() for _, v in bench.get(port)] for port in bench.block.inputs}
@@ -212,7 +213,8 @@ def _inputs_kept(subject: Subject) -> None:
 
 
 def _machine(subject: Subject) -> None:
-    """The outputs of a Moore block follow from its state alone, and ``update`` writes no output."""
+    """Check that the outputs of a Moore block follow from its state alone, and ``update`` writes
+    none."""
     if not subject.block_type.is_moore():
         return
     one, other = subject.bench(), subject.bench()
@@ -246,7 +248,8 @@ def _deterministic(subject: Subject) -> None:
 
 
 def _restored(subject: Subject) -> None:
-    """A block restored from a snapshot goes on as it did then, and so does a new instance."""
+    """Check that a block restored from a snapshot goes on as it did then, and so does a new
+    instance."""
     bench = subject.bench()
     subject.trace(bench)
     snapshot = bench.snapshot()
@@ -317,7 +320,8 @@ def _finite(subject: Subject) -> None:
 
 
 def _life(subject: Subject) -> None:
-    """A block can be stopped before its first tick and after; metrics are plain values."""
+    """Check that a block can be stopped before its first tick and after, and that metrics are
+    plain."""
     for ticks in (0, TICKS):
         bench = subject.bench()
         subject.trace(bench, ticks)
@@ -350,7 +354,7 @@ CASES: Mapping[str, Callable[[Subject], None]] = {
 
 
 def conformance_cases() -> tuple[str, ...]:
-    """The names of all checks, to parametrise a test with."""
+    """Return the names of all checks, to parametrise a test with."""
     return tuple(CASES)
 
 
@@ -361,7 +365,7 @@ def unmet_messages(
     robot: str | RobotDescription | None = None,
     rate: float = 500.0,
 ) -> tuple[str, ...]:
-    """Why the block cannot work with the robot, as a graph's load report would say it.
+    """Return the reasons why the block cannot work with the robot, as in a graph's load report.
 
     The result is empty if it can. The arguments are those of ``check_block``.
     """
@@ -422,7 +426,7 @@ def check_block(
 def random_value(
     name: str, field: Field, shape: tuple[int, ...], rng: np.random.Generator
 ) -> NDArray[Any]:
-    """A random legal value of a field, whose elements are finite and of order one."""
+    """Draw a random legal value of a field, whose elements are finite and of order one."""
     if field.dtype_name == "bool":
         return rng.random(shape) < 0.5
     if field.dtype_name == "int64":
@@ -436,7 +440,7 @@ def random_value(
 
 
 def random_quaternion(shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np.float64]:
-    """Unit quaternions x, y, z, w of moderate angles, (*shape, 4)."""
+    """Draw unit quaternions x, y, z, w of moderate angles, (*shape, 4)."""
     value = np.asarray(rng.uniform(-0.3, 0.3, (*shape, 4)))
     value[..., 3] = 1.0
     return np.asarray(value / np.linalg.norm(value, axis=-1, keepdims=True))
@@ -466,14 +470,15 @@ def random_inputs(
 def _inputs_of(
     block_type: type[Block], sizes: tuple[tuple[str, int], ...], *seeds: int
 ) -> tuple[dict[str, dict[str, Any]], ...]:
-    """The inputs of ``TICKS`` ticks; kept, because many instances of a block get equal ones."""
+    """Return the inputs of ``TICKS`` ticks; kept, because many instances of a block get equal
+    ones."""
     rng, dimensions = np.random.default_rng(seeds), dict(sizes)
     return tuple(random_inputs(block_type, dimensions, rng) for _ in range(TICKS))
 
 
 def live_changes(params: Parameters) -> Iterator[tuple[str, Parameters]]:
-    """For every live parameter, and every value inside one, its path and a set of parameters in
-    which it alone is changed to another legal value."""
+    """Yield, for every live parameter, and every value inside one, its path and a set of parameters
+    in which it alone is changed to another legal value."""
     for name, info in type(params).model_fields.items():
         if is_live(info):
             for path, value in _others(getattr(params, name), info.annotation):
@@ -483,7 +488,8 @@ def live_changes(params: Parameters) -> Iterator[tuple[str, Parameters]]:
 
 
 def _with(params: Any, name: str, value: Any) -> Any:
-    """The model with one value replaced, or ``None`` if that is not legal or changes nothing."""
+    """Return the model with one value replaced, or ``None`` if that is not legal or changes
+    nothing."""
     data = {**params.model_dump(round_trip=True), name: value}
     try:
         changed = type(params).model_validate(data)

@@ -36,7 +36,7 @@ def checked_graph(
     clock: ClockSpec | None = None,
     name: str = "test",
 ) -> CheckedGraph:
-    """A graph from blocks by path; neither the blocks nor their wires are checked.
+    """Make a graph from blocks by path; neither the blocks nor their wires are checked.
 
     A wire is the source's ``block.port``, or a ``Wire`` with a ``delay``, which becomes a delay
     block called ``block/input_delay`` that runs in the same ticks as the source.

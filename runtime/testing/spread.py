@@ -1,9 +1,9 @@
 """Runs all parts of a placed graph in one process, for tests and for measurements of links.
 
-``run_spread`` runs them in threads, in lockstep. ``run_virtual`` runs free-running parts: they tick at
-their own phases, messages take the time that the caller says, and computing takes none. One thread goes from
-event to event, so a run is the same on every machine, however busy it is. Beacons are left out: the parts count as
-started, and have one clock.
+``run_spread`` runs them in threads, in lockstep. ``run_virtual`` runs free-running parts: they tick
+at their own phases, messages take the time that the caller sets, and computing takes none. One
+thread goes from event to event, so a run is the same on every machine, however busy it is. Beacons
+are left out: the parts count as started, and have one clock.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ..language.block import Metric
 from ..language.errors import AloftError
 from ..language.stages import CheckedGraph, ClockSpec
 from ..links.part import COORDINATOR, PREPARED, STARTED, BoundPart, MergedLayout, hash_of, run_part
-from ..placement.placed import PlacedGraph, place
+from ..placement.placed import PlacedGraph, split_over_machines
 from ..running.run_result import RunResult, merge_metrics
 from ..running.sinks import Sink
 from ..running.ticker import Ticker
@@ -34,7 +34,7 @@ Interfere = Callable[[str, bytes], Iterable[bytes]]
 
 @dataclass(frozen=True)
 class SpreadResult:
-    """What the parts of a run gave, by machine."""
+    """Results of the parts of a run, by machine."""
 
     placed: PlacedGraph
     results: Mapping[str, RunResult]
@@ -42,7 +42,7 @@ class SpreadResult:
 
     @property
     def ticks(self) -> int:
-        """How many ticks all parts have recorded."""
+        """Number of ticks that all parts have recorded."""
         counts = {machine: len(log.ticks) for machine, log in self._logs().items()}
         if len(dict.fromkeys(counts.values())) != 1:
             raise AloftError(f"the parts have recorded different numbers of ticks: {counts}")
@@ -92,7 +92,7 @@ def run_spread(
     hub = Hub()
     hub.interfere = interfere
     return run_parts_of(
-        place(graph), hub, ticks=ticks, prepare=prepare, timeout=timeout, wall_time=wall_time,
+        split_over_machines(graph), hub, ticks=ticks, prepare=prepare, timeout=timeout, wall_time=wall_time,
         **options,
     )  # fmt: skip
 
@@ -108,7 +108,7 @@ def run_parts_of(
     wall_time: float = 60.0,
     **options: Any,
 ) -> SpreadResult:
-    """As ``run_spread``, with a hub and with sinks for each machine."""
+    """Run as ``run_spread`` does, with a hub and with sinks for each machine."""
     parts = {
         machine.name: BoundPart(
             placed, machine.name, hub.transport(), timeout=timeout, connect_timeout=timeout
@@ -146,7 +146,8 @@ _RUNTIME = (COORDINATOR, PREPARED, STARTED)
 
 @dataclass(frozen=True)
 class VirtualRun:
-    """What a run gave: whether it succeeded and why, its metrics, its parts, and how long it was [s]."""
+    """Result of a run: whether it succeeded and why, its metrics, its parts, and its duration
+    [s]."""
 
     success: bool
     reason: str
@@ -165,7 +166,7 @@ class _Time:
         return self.time
 
     def sleep(self, seconds: float) -> None:
-        """Nobody sleeps: ticks are events."""
+        """Do nothing: ticks are events."""
 
 
 class _Network:
@@ -201,7 +202,7 @@ class _VirtualTransport:
         self._network = network
 
     def open(self, machine: str, lost: Callable[[str], None]) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
     def publisher(self, key: str) -> MessageCallback:
         return lambda data: self._network.send(key, data)
@@ -210,13 +211,13 @@ class _VirtualTransport:
         return self.publisher(key)
 
     def before_close(self, call: Callable[[], None]) -> None:
-        """Nothing to do: it does not close."""
+        """Do nothing: this transport does not close."""
 
     def subscribe(self, key: str, take: MessageCallback) -> None:
         self._network.takers[key] = take
 
     def close(self) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
 
 def run_virtual(
@@ -226,10 +227,10 @@ def run_virtual(
     *,
     plain: bool = False,
 ) -> VirtualRun:
-    """Run a free-running graph for its duration, or until a block asks for the end.
+    """Run a free-running graph for its duration, or until a block requests the end.
 
     Args:
-        graph: with machines; what it says of its clock does not matter.
+        graph: with machines; its clock is ignored.
         travel: how long each message takes.
         phases: when the first tick of each machine is, as a share of a period; by default zero.
         plain: whether nothing is compiled.
@@ -237,7 +238,7 @@ def run_virtual(
     Raises:
         AloftError: the graph names no machines, or a part fails.
     """
-    placed = place(graph)
+    placed = split_over_machines(graph)
     time = _Time()
     network = _Network(time, travel)
     parts = {
@@ -270,8 +271,8 @@ def run_virtual(
         for path, block in part.blocks.items()
         if path in [spec.path for spec in placed.blocks_on(name)]
     }
-    metrics, unmet, praise = merge_metrics(own)
-    reason = unmet or praise or stopped or "ran to its end"
+    metrics, unmet, success_reason = merge_metrics(own)
+    reason = unmet or success_reason or stopped or "ran to its end"
     began = 1_000_000_000
     return VirtualRun(unmet is None, reason, metrics, parts, (time.time - began) * 1e-9)
 

@@ -31,7 +31,7 @@ class StretchError(AssertionError):
 
 @dataclass(frozen=True)
 class Setting:
-    """What a block's outputs depend on besides its parameters and inputs.
+    """Environment of a block, on which its outputs depend besides its parameters and inputs.
 
     These are the base ``rate`` [Hz], the ``period_ticks`` between two runs, the sizes of the
     ``dimensions``, the names of the ``wired`` inputs, the ``robot`` as plain data, and the

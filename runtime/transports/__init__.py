@@ -1,1 +1,1 @@
-"""What carries messages between machines, one class for each protocol."""
+"""Transports, which carry messages between machines: one class for each protocol."""

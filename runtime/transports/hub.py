@@ -13,7 +13,7 @@ from .transport import MessageCallback
 
 
 class Hub:
-    """Where the transports of the parts meet."""
+    """Meeting point of the transports of the parts."""
 
     def __init__(self) -> None:
         self.interfere: Callable[[str, bytes], Iterable[bytes]] | None = None
@@ -22,16 +22,17 @@ class Hub:
         self._lock = threading.Lock()
 
     def transport(self) -> HubTransport:
-        """A transport for one part."""
+        """Make a transport for one part."""
         return HubTransport(self)
 
     def enter(self, machine: str, lost: Callable[[str], None]) -> None:
-        """A machine is there."""
+        """Register a machine."""
         with self._lock:
             self._present[machine] = lost
 
     def leave(self, machine: str) -> None:
-        """A machine has closed its transport, or is made to look as if its process had ended."""
+        """Remove a machine that has closed its transport, or is to look as if its process had
+        ended."""
         with self._lock:
             self._present.pop(machine, None)
             peers = list(self._present.values())
@@ -65,7 +66,7 @@ class HubTransport:
         self.hub.enter(machine, lost)
 
     def publisher(self, key: str) -> MessageCallback:
-        """What sends under ``key``; a machine that has left sends nothing."""
+        """Return a function that sends under ``key``; a machine that has left sends nothing."""
 
         def send(data: bytes) -> None:
             if self.machine:
@@ -75,11 +76,11 @@ class HubTransport:
 
     @property
     def is_open(self) -> bool:
-        """Whether it has entered the hub."""
+        """True if it has entered the hub."""
         return bool(self.machine)
 
     def background_publisher(self, key: str) -> MessageCallback:
-        """What shows something to observers: a hub has no priorities."""
+        """Return a function that publishes to observers: a hub has no priorities."""
         return self.publisher(key)
 
     def before_close(self, call: Callable[[], None]) -> None:

@@ -1,12 +1,12 @@
 """The folder that ``aloft keys`` makes: an authority, and for each party what it needs and no more.
 
-``FOLDER/authority.pem`` and ``authority-key.pem`` stay where they are made. ``FOLDER/NAME/`` is for the
-machine or observer of that name: its certificate and key, the authority's certificate, and
-``session.json5``, the configuration of its Zenoh session. A run takes its own folder and refuses one that
-was made for another graph.
+``FOLDER/authority.pem`` and ``authority-key.pem`` stay where they are made. ``FOLDER/NAME/`` is for
+the machine or observer of that name: its certificate and key, the authority's certificate, and
+``session.json5``, the configuration of its Zenoh session. A run takes its own folder and refuses
+one that was made for another graph.
 
-Certificates are for sessions with mutual TLS, and their keys are those of NIST P-256. An authority signs
-nothing but what it is asked to here.
+Certificates are for sessions with mutual TLS, and their keys are those of NIST P-256. An authority
+signs only what is made here.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ _EARLIER = timedelta(minutes=10)
 
 @dataclass(frozen=True)
 class Authority:
-    """Who signs: its certificate and its key."""
+    """Certificate authority: its certificate and its key."""
 
     certificate: Any
     key: Any
 
     @classmethod
     def make(cls, name: str, days: int) -> Authority:
-        """A new certificate authority, valid for this many days."""
+        """Make a new certificate authority, valid for this many days."""
         x509, hashes, ec = _library()
         key = ec.generate_private_key(ec.SECP256R1())
         subject = _name(name)
@@ -54,7 +54,7 @@ class Authority:
 
     @classmethod
     def read(cls, folder: Path) -> Authority:
-        """The one that a folder holds.
+        """Read the authority that a folder holds.
 
         Raises:
             AloftError: its files cannot be read.
@@ -108,7 +108,8 @@ class Authority:
         (folder / AUTHORITY).write_bytes(_pem(self.certificate))
 
     def signed(self, folder: Path) -> bool:
-        """Whether a folder holds a certificate of this authority that is valid for another day."""
+        """Return whether a folder holds a certificate of this authority that is valid for another
+        day."""
         x509, _, _ = _library()
         try:
             certificate = x509.load_pem_x509_certificate((folder / CERTIFICATE).read_bytes())
@@ -120,7 +121,7 @@ class Authority:
 
 
 def hosts_of(folder: Path) -> list[str]:
-    """The addresses and names that the certificate in a folder is for."""
+    """Return the addresses and names that the certificate in a folder is for."""
     x509, _, _ = _library()
     certificate = x509.load_pem_x509_certificate((folder / CERTIFICATE).read_bytes())
     found = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
@@ -168,7 +169,8 @@ def _builder(subject: Any, issuer: Any, public_key: Any, days: int) -> Any:
 
 
 def _usage(*, sign: bool) -> Any:
-    """Signing certificates, or else signing what a session says."""
+    """Return the usage of a key: signing certificates, or else signing the messages of a
+    session."""
     x509, _, _ = _library()
     return x509.KeyUsage(
         digital_signature=not sign, key_cert_sign=sign, crl_sign=sign, content_commitment=False,
@@ -199,7 +201,7 @@ _LOOPBACK = ("127.0.0.1", "localhost")
 
 
 def host_of(endpoint: str) -> str:
-    """The address or name in ``tls/ADDRESS:PORT``."""
+    """Return the address or name in ``tls/ADDRESS:PORT``."""
     return endpoint.partition("/")[2].rpartition(":")[0].strip("[]")
 
 
@@ -267,7 +269,7 @@ def check_endpoints(placed: PlacedGraph) -> None:
 
 
 def secured(placed: PlacedGraph, folder: Path, name: str) -> dict[str, Any]:
-    """What a session of ``name`` takes over from its folder: TLS and access control.
+    """Return the settings of a session of ``name`` from its folder: TLS and access control.
 
     Raises:
         AloftError: the folder lacks a file, or was made for another graph.
@@ -299,7 +301,8 @@ def _access(placed: PlacedGraph, name: str, observers: Sequence[str]) -> dict[st
 
 
 def _session(placed: PlacedGraph, name: str, observers: Sequence[str]) -> dict[str, Any]:
-    """The configuration of a session, as Zenoh reads it, with paths relative to its own folder."""
+    """Return the configuration of a session, as Zenoh reads it, with paths relative to its own
+    folder."""
     names = [spec.name for spec in placed.machines]
     ends = [spec.endpoint for spec in placed.machines]
     place = names.index(name) if name in names else len(names)

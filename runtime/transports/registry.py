@@ -1,4 +1,4 @@
-"""Which transport carries the links of a graph, and what its endpoints look like.
+"""Registry of the transports that carry the links of a graph, and the form of their endpoints.
 
 An endpoint is ``SCHEME/ADDRESS:PORT``. All machines of a graph use one transport. Another transport is a
 class with the methods of ``NetworkTransport`` in a file of its own, and a line in ``TRANSPORTS``.
@@ -15,13 +15,11 @@ from pathlib import Path
 from ..language.stages import MachineSpec
 from ..placement.placed import PlacedGraph
 from .transport import NetworkTransport
-from .udp import UdpTransport
 from .zenoh_transport import ZenohTransport
 
 TRANSPORTS: dict[str, type[NetworkTransport]] = {
     "tcp": ZenohTransport,
     "tls": ZenohTransport,
-    "udp": UdpTransport,
 }
 """The class of each scheme."""
 EXAMPLE = "tcp/127.0.0.1:7450"
@@ -31,12 +29,12 @@ _ENDPOINT = re.compile(
 
 
 def endpoint_pattern() -> str:
-    """A regular expression for endpoints, as in a JSON Schema."""
+    """Return a regular expression for endpoints, as in a JSON Schema."""
     return f"^({'|'.join(TRANSPORTS)})/.+:[0-9]+$"
 
 
-def endpoint_fault(text: str) -> str:
-    """What is wrong with an endpoint; empty if nothing is."""
+def endpoint_problem(text: str) -> str:
+    """Describe the fault of an endpoint; empty if there is none."""
     match = _ENDPOINT.match(text)
     if match is None or match["scheme"] not in TRANSPORTS:
         *most, last = [f"{scheme}/ADDRESS:PORT" for scheme in TRANSPORTS]
@@ -53,12 +51,12 @@ def endpoint_fault(text: str) -> str:
             return "it stands for all addresses of a machine, and the others need one to connect to"
         if address.is_multicast:
             return "a multicast address is not the address of one machine"
-    return TRANSPORTS[match["scheme"]].host_fault(host)
+    return ""
 
 
 def open_endpoints(machines: Sequence[MachineSpec]) -> list[str]:
-    """What should be known of machines that anybody in their network can reach: one text for each
-    whose endpoint is beyond the loopback and asks for no keys."""
+    """Return warnings on machines that anybody in their network can reach: one text for each whose
+    endpoint is beyond the loopback and requires no keys."""
     return [
         f"machine {spec.name!r} listens at {spec.endpoint}: whoever reaches it can read and command this "
         "graph; `aloft keys` makes certificates for tls/ endpoints"
@@ -83,11 +81,9 @@ def _is_loopback(endpoint: str) -> bool:
 
 
 def silent_endpoint(endpoint: str, timeout: float = 0.3) -> str:
-    """What one can find out about a machine that was not heard: whether anybody listens at its
-    endpoint. Opens a connection and sends nothing."""
+    """Find the likely cause of a machine's silence: whether anybody listens at its endpoint. Opens
+    a connection and sends nothing."""
     scheme, host, port = _parts(endpoint)
-    if scheme not in ("tcp", "tls"):
-        return "nothing was heard"
     try:
         socket.create_connection((host, port), timeout).close()
     except OSError as error:
@@ -97,12 +93,12 @@ def silent_endpoint(endpoint: str, timeout: float = 0.3) -> str:
 
 
 def transport_type(machines: Sequence[MachineSpec]) -> type[NetworkTransport]:
-    """The transport that these machines use, of which there is one."""
+    """Return the transport that these machines use, of which there is one."""
     return TRANSPORTS[machines[0].endpoint.partition("/")[0]]
 
 
 def network_transport(placed: PlacedGraph, name: str, keys: Path | None = None) -> NetworkTransport:
-    """The transport of the machine or the observer ``name``, not yet connected.
+    """Return the transport of the machine or the observer ``name``, not yet connected.
 
     Args:
         placed: the graph.

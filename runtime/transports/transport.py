@@ -1,4 +1,5 @@
-"""What carries messages between machines; the runtime knows nothing else about a network."""
+"""Interface of a transport of messages between machines; the runtime knows nothing else about a
+network."""
 
 from __future__ import annotations
 
@@ -26,15 +27,15 @@ class Transport(Protocol):
         """
 
     def publisher(self, key: str) -> MessageCallback:
-        """What sends a message under ``key`` to whoever subscribes to it."""
+        """Return a function that sends a message under ``key`` to all its subscribers."""
 
     @property
     def is_open(self) -> bool:
-        """Whether it is connected."""
+        """True if it is connected."""
 
     def background_publisher(self, key: str) -> MessageCallback:
-        """What shows something under ``key`` to observers: at the lowest priority, and dropped where
-        a queue is full."""
+        """Return a function that publishes under ``key`` to observers: at the lowest priority, and
+        dropped where a queue is full."""
 
     def before_close(self, call: Callable[[], None]) -> None:
         """Have this called when it is about to disconnect, while everything can still be sent."""
@@ -51,7 +52,7 @@ class NetworkTransport(Transport, Protocol):
 
     @classmethod
     def of(cls, placed: PlacedGraph, name: str, keys: Path | None = None) -> Self:
-        """The transport of the machine or the observer ``name``, not yet connected.
+        """Return the transport of the machine or the observer ``name``, not yet connected.
 
         ``keys`` is the folder of ``aloft keys``.
 
@@ -60,13 +61,8 @@ class NetworkTransport(Transport, Protocol):
         """
 
     @classmethod
-    def host_fault(cls, host: str) -> str:
-        """Why no machine can listen at ``host``, or an empty text."""
-        return ""
-
-    @classmethod
     def needs_keys(cls, placed: PlacedGraph) -> bool:
-        """Whether only who has keys can connect to the machines of this graph."""
+        """Return whether only holders of keys can connect to the machines of this graph."""
         return False
 
     @classmethod
@@ -81,40 +77,41 @@ class NetworkTransport(Transport, Protocol):
         """
 
 
-def free_ports(count: int, kind: socket.SocketKind = socket.SOCK_STREAM) -> list[int]:
+def free_ports(count: int) -> list[int]:
     """Free ports of the loopback."""
     with ExitStack() as stack:
-        sockets = [stack.enter_context(socket.socket(type=kind)) for _ in range(count)]
+        sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
         for made in sockets:
             made.bind(("127.0.0.1", 0))
         return [made.getsockname()[1] for made in sockets]
 
 
 def data_key(sender: str, receiver: str, source: str) -> str:
-    """The key of the link that carries the outputs of the block ``source``."""
+    """Return the key of the link that carries the outputs of the block ``source``."""
     return f"data/{sender}/{receiver}/{source}"
 
 
 def beacon_key(sender: str, receiver: str) -> str:
-    """The key under which a machine says how far it is."""
+    """Return the key under which a machine sends its phase."""
     return f"beacon/{sender}/{receiver}"
 
 
 def status_key(machine: str) -> str:
-    """The key under which a machine tells observers how it does."""
+    """Return the key under which a machine publishes its health to observers."""
     return f"watch/{machine}/status"
 
 
 def rows_key(machine: str) -> str:
-    """The key under which a machine shows its signals to observers."""
+    """Return the key under which a machine shows its signals to observers."""
     return f"watch/{machine}/rows"
 
 
 def window_key(machine: str) -> str:
-    """The key under which a machine shows its signals and the times of its blocks to a page."""
+    """Return the key under which a machine shows its signals and the times of its blocks to a
+    page."""
     return f"watch/{machine}/window"
 
 
 def tick_key(sender: str, receiver: str) -> str:
-    """The key under which a machine says how a tick ended."""
+    """Return the key under which a machine sends the outcome of a tick."""
     return f"tick/{sender}/{receiver}"

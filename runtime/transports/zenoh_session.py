@@ -18,14 +18,14 @@ from ..placement.placed import PlacedGraph
 from .transport import beacon_key, data_key, tick_key
 
 LEASE = 500
-"""Milliseconds after which a peer that says nothing is taken for lost."""
+"""Milliseconds of silence after which a peer is taken for lost."""
 ROOT = "aloft"
 """The first part of every key expression."""
 
 
 def session_settings(listen: Sequence[str], connect: Sequence[str]) -> dict[str, Any]:
-    """The settings of a peer that listens and connects only at these endpoints, by their paths in
-    Zenoh's configuration."""
+    """Return the settings of a peer that listens and connects only at these endpoints, by their
+    paths in Zenoh's configuration."""
     return {
         "mode": "peer",
         "scouting/multicast/enabled": False,
@@ -58,21 +58,22 @@ def session_config(
 
 
 def as_chunk(name: str) -> str:
-    """A name as one or more chunks of a key expression, without what is special there."""
+    """Return a name as one or more chunks of a key expression, without what is special there."""
     return re.sub(r"[^A-Za-z0-9_./~-]", "_", name)
 
 
 def prefix_of(graph: str) -> str:
-    """What all key expressions of a graph begin with."""
+    """Return the common prefix of all key expressions of a graph."""
     return f"{ROOT}/{as_chunk(graph).replace('/', '_')}"
 
 
 WATCH = "watch"
-"""What parts say of themselves to whoever may watch: keys ``watch/MACHINE/...``; see ``links.observer``."""
+"""Prefix of the keys under which parts publish their state to observers: ``watch/MACHINE/...``; see
+``links.observer``."""
 
 
 def keys_from(placed: PlacedGraph, sender: str, receiver: str) -> list[str]:
-    """The keys under which one machine sends to another."""
+    """Return the keys under which one machine sends to another."""
     keys = [beacon_key(sender, receiver), tick_key(sender, receiver)]
     keys += [
         data_key(sender, receiver, link.source)

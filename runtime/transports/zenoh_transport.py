@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
-from ..language.errors import AloftError, need_extra
+from ..language.errors import AloftError
 from ..language.stages import MachineSpec
 from ..placement.placed import PlacedGraph
 from .keys import check_endpoints, secured
@@ -50,7 +50,7 @@ class ZenohTransport(NetworkTransport):
 
     @classmethod
     def of(cls, placed: PlacedGraph, name: str, keys: Path | None = None) -> Self:
-        """The transport of a machine or an observer; ``tls`` endpoints need keys."""
+        """Return the transport of a machine or an observer; ``tls`` endpoints need keys."""
         if keys is not None:
             check_endpoints(placed)
         elif cls.needs_keys(placed):
@@ -67,7 +67,7 @@ class ZenohTransport(NetworkTransport):
 
     @classmethod
     def needs_keys(cls, placed: PlacedGraph) -> bool:
-        """Whether an endpoint is ``tls``."""
+        """Return whether an endpoint is ``tls``."""
         return any(spec.endpoint.startswith("tls/") for spec in placed.machines)
 
     @classmethod
@@ -78,7 +78,6 @@ class ZenohTransport(NetworkTransport):
 
     def observe(self) -> None:
         """Open a session that connects to all machines and listens nowhere."""
-        need_extra("zenoh", "machines", "a link between machines")
         import zenoh
 
         endpoints = [spec.endpoint for spec in self._machines]
@@ -89,7 +88,6 @@ class ZenohTransport(NetworkTransport):
 
     def open(self, machine: str, lost: Callable[[str], None]) -> None:
         """Open the session and say that the machine is there."""
-        need_extra("zenoh", "machines", "a link between machines")
         import zenoh
 
         names = [spec.name for spec in self._machines]
@@ -136,11 +134,11 @@ class ZenohTransport(NetworkTransport):
 
     @property
     def is_open(self) -> bool:
-        """Whether it is connected."""
+        """True if it is connected."""
         return self._session is not None
 
     def background_publisher(self, key: str) -> MessageCallback:
-        """A publisher that never delays any other."""
+        """Return a publisher that never delays any other."""
         import zenoh
 
         publisher = self._session.declare_publisher(
@@ -159,7 +157,7 @@ class ZenohTransport(NetworkTransport):
         self._farewells.append(call)
 
     def publisher(self, key: str) -> MessageCallback:
-        """A publisher whose messages go out at once."""
+        """Return a publisher whose messages go out at once."""
         import zenoh
 
         publisher = self._session.declare_publisher(
@@ -177,7 +175,7 @@ class ZenohTransport(NetworkTransport):
         return put
 
     def subscribe(self, key: str, take: MessageCallback) -> None:
-        """A subscriber that is called on a thread of Zenoh."""
+        """Subscribe to a key; the call comes from a thread of Zenoh."""
         import zenoh
 
         def heard(sample: Any) -> None:

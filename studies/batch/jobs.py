@@ -83,9 +83,9 @@ def attempt(function: Callable[[Any], Any], job: Any) -> tuple[Any, str]:
 
 
 ATTEMPTS = 2
-"""How often a job is tried whose process dies; if it dies twice, the job is taken for the cause."""
+"""Number of attempts at a job whose process dies; after the last the job is taken for the cause."""
 TIMEOUT = 10.0
-"""How long processes may take to stop before they are killed [s]."""
+"""Longest time that processes may take to stop before they are killed [s]."""
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 Numbered = tuple[int, Any]
@@ -104,7 +104,7 @@ class _Worker:
 def _process_results(
     function: Callable[[Any], Any], jobs: Iterable[Any], workers: list[_Worker], count: int
 ) -> Generator[JobResult, None, None]:
-    """The results of all jobs, done by ``workers``, which become at most ``count``."""
+    """Yield the results of all jobs, done by ``workers``, which become at most ``count``."""
     numbered = enumerate(jobs)
     again: deque[Numbered] = deque()
     begun: dict[int, int] = {}
@@ -200,7 +200,7 @@ def _worker_environment() -> Iterator[None]:
 
 
 def _exit_reason(worker: _Worker) -> str:
-    """Why a worker's process ended.
+    """Return the reason for which a worker's process ended.
 
     Raises:
         AloftError: the process could not even start, so no other one would either.
@@ -233,14 +233,14 @@ def _stop(workers: list[_Worker]) -> None:
 
 
 class _StoppedError(BaseException):
-    """Raised in a worker that is told to stop."""
+    """Raised in a worker that receives the signal to stop."""
 
 
 _stopping = False
 
 
 def _work(pipe: Connection, function: Callable[[Any], Any]) -> None:
-    """What a worker's process does: one job after another until its pipe is closed.
+    """Do one job after another in a worker's process until its pipe is closed.
 
     SIGTERM raises an exception in the job under way, so that the job can clean up. A running graph
     handles the signal itself, and its robot comes to rest.
@@ -270,7 +270,7 @@ def _work(pipe: Connection, function: Callable[[Any], Any]) -> None:
 
 
 def _on_terminate(number: int, frame: object) -> None:
-    """The first signal ends the job under way; a further one changes nothing."""
+    """End the job under way at the first signal; a further one changes nothing."""
     global _stopping
     if not _stopping:
         _stopping = True
@@ -313,7 +313,7 @@ class JobPool:
         self._client = None
 
     def results(self, jobs: Iterable[Any]) -> Generator[JobResult, None, None]:
-        """The results of all jobs, in the order in which they are ready.
+        """Yield the results of all jobs, in the order in which they are ready.
 
         Jobs are taken from ``jobs`` only as they are needed. Closing the generator, or an exception in
         it, stops the jobs under way: their processes get SIGTERM, and SIGKILL if they have not ended
@@ -337,13 +337,13 @@ def job_results(
     workers: int = 0,
     cluster: str | None = None,
 ) -> Generator[JobResult, None, None]:
-    """The results of one batch of jobs; see ``JobPool``."""
+    """Yield the results of one batch of jobs; see ``JobPool``."""
     with JobPool(function, workers=workers, cluster=cluster) as pool:
         yield from pool.results(jobs)
 
 
 def processors() -> int:
-    """How many processors this process may use."""
+    """Return the number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -351,7 +351,7 @@ def processors() -> int:
 
 @cache
 def running_loop(wait: float = 120.0) -> Any:
-    """The tornado ``IOLoop`` of this process, which runs until the process ends.
+    """Return the tornado ``IOLoop`` of this process, which runs until the process ends.
 
     Args:
         wait: for the thread to come to run [s].
@@ -382,17 +382,18 @@ async def _until_the_end(ready: Future[Any]) -> None:
 
 
 WAIT = 10.0
-"""How long to wait for the scheduler and for a first worker [s]."""
+"""Longest wait for the scheduler and for a first worker [s]."""
 AHEAD = 2
-"""How many jobs are submitted for every thread of the cluster, so that no thread ever waits."""
+"""Number of jobs submitted for every thread of the cluster, so that no thread ever waits."""
 MOST_LOSSES = 10
-"""How often the result of one job may be lost with its worker before the job is given up."""
+"""Number of times that the result of one job may be lost with its worker before the job is given
+up."""
 
 
 def _cluster_results(
     function: Callable[[Any], Any], jobs: Iterable[Any], client: Any, address: str
 ) -> Generator[JobResult, None, None]:
-    """The results of all jobs, done by a cluster.
+    """Yield the results of all jobs, done by a cluster.
 
     When a worker is lost, the scheduler gives its jobs to another one. It gives up on all jobs that
     were on several lost workers, because it cannot tell which of them was the cause. These jobs are
@@ -446,7 +447,7 @@ def _cluster_results(
 
 @contextmanager
 def _connected(address: str) -> Iterator[Any]:
-    """A client of a cluster whose workers have the same version of aloft.
+    """Connect to a cluster whose workers have the same version of aloft.
 
     Raises:
         AloftError: Dask is not installed, there is no scheduler at the address, or a worker has no
@@ -488,5 +489,5 @@ def _check_workers(client: Any, address: str) -> None:
 
 
 def _version() -> str:
-    """The version of aloft that is installed in the process that calls this."""
+    """Return the version of aloft that is installed in the process that calls this."""
     return version("aloft-robotics")

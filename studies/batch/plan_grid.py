@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ...planner.library.library import PlanLibrary, solve_and_check
-from ...planner.task.files import Key, PlacedFile, read_placed, remove_abandoned, write_whole
+from ...planner.task.files import Key, LocatedFile, read_located, remove_abandoned, write_whole
 from ...planner.task.plan import PlanFileError, PlannedJump
 from ...planner.task.task import JumpTask, JumpTaskError, make_task
 from ...robots.description import RobotDescription, find_robot
@@ -45,13 +45,13 @@ class GridRow:
 
 
 def read_grid(path: str | Path) -> list[JumpTask]:
-    """The tasks of a grid file, the last parameter changing fastest.
+    """Read the tasks of a grid file, the last parameter changing fastest.
 
     Raises:
         JumpTaskError: the file cannot be read, or one of its tasks is wrong.
     """
     path = Path(path)
-    source = read_placed(path, "grid: {rise: [10 cm, 15 cm]}")
+    source = read_located(path, "grid: {rise: [10 cm, 15 cm]}")
     data, axes = source.values, source.values.get("grid")
     for key in data:
         if key not in ("name", "task", "grid"):
@@ -79,8 +79,8 @@ def read_grid(path: str | Path) -> list[JumpTask]:
 
 
 @dataclass(frozen=True)
-class _Point(PlacedFile):
-    """Where the values of one task of a grid are: in its list on an axis, or under ``task``."""
+class _Point(LocatedFile):
+    """The position of the values of one task of a grid: in its list on an axis, or under ``task``."""
 
     numbers: Mapping[str, int]
 
@@ -92,8 +92,8 @@ class _Point(PlacedFile):
         return super().place(inside, key=key)
 
 
-def _values(source: PlacedFile, key: str, given: Any) -> list[Any]:
-    """The values of one parameter of a grid."""
+def _values(source: LocatedFile, key: str, given: Any) -> list[Any]:
+    """Return the values of one parameter of a grid."""
     if isinstance(given, list) and given:
         return given
     if isinstance(given, Mapping) and set(given) == {"from", "to", "count"}:
@@ -107,8 +107,8 @@ def _values(source: PlacedFile, key: str, given: Any) -> list[Any]:
     )
 
 
-def _number(source: PlacedFile, key: str, given: Mapping[str, Any], which: str) -> float:
-    """An end of an axis in the unit of the task's parameter of that name."""
+def _number(source: LocatedFile, key: str, given: Mapping[str, Any], which: str) -> float:
+    """Return an end of an axis in the unit of the task's parameter of that name."""
     others = {} if key in ("rise", "take_off_speed") else {"rise": 0.1}
     where = f"{source.place(['grid', key, which])}: {which}"
     task = make_task({"name": "grid", **others, key: given[which]}, where=where)
@@ -158,8 +158,8 @@ def fill(
 
 
 def _found(library: PlanLibrary, task: JumpTask) -> PlannedJump | None:
-    """The plan that is kept of a task. One whose file is damaged counts as none: this run makes it
-    anew."""
+    """Return the plan that is kept of a task. One whose file is damaged counts as none: this run
+    makes it anew."""
     try:
         return library.find(task)
     except PlanFileError:
@@ -179,12 +179,13 @@ def _keep(library: PlanLibrary, task: JumpTask, plan: PlannedJump | None, reason
 
 
 def failure_mark(library: PlanLibrary, task: JumpTask) -> Path:
-    """The path of the file that says that a task could not be planned."""
+    """Return the path of the file that says that a task could not be planned."""
     return library.folder / f"{task.hash(library.robot)}.failed"
 
 
 def read_failure(mark: Path) -> str | None:
-    """Why a task could not be planned; ``None`` if there is no such file or it cannot be read."""
+    """Return the reason why a task could not be planned; ``None`` if there is no such file or it
+    cannot be read."""
     try:
         return str(json.loads(mark.read_text(encoding="utf-8"))["reason"])
     except (OSError, ValueError, KeyError, TypeError):
@@ -200,7 +201,7 @@ def plan_one(job: tuple[JumpTask, RobotDescription]) -> tuple[PlannedJump | None
 
 
 def robot_of(tasks: Sequence[JumpTask]) -> RobotDescription:
-    """The robot of all tasks. Raises ``JumpTaskError`` where they name several."""
+    """Return the robot of all tasks. Raises ``JumpTaskError`` where they name several."""
     names = sorted({task.robot for task in tasks})
     if len(names) != 1:
         raise JumpTaskError(f"a grid is for one robot, found {', '.join(names)}")

@@ -25,7 +25,7 @@ class SeedRow:
 
 
 def parse_seeds(text: str) -> list[int]:
-    """The seeds that a text means: ``0:20`` (20 excluded), ``1,5,7``, ``3``, or ``0:5,8``.
+    """Parse a text of seeds: ``0:20`` (20 excluded), ``1,5,7``, ``3``, or ``0:5,8``.
 
     Raises:
         AloftError: the text is not of this form, names no seed, names one twice or one below zero.
@@ -47,7 +47,7 @@ def parse_seeds(text: str) -> list[int]:
 
 
 def overrides_for(graph: Graph, overrides: Sequence[str], seed: int) -> list[str]:
-    """``overrides``, and one more for every parameter of the graph that is called ``seed``.
+    """Return ``overrides``, and one more for every parameter of the graph that is called ``seed``.
 
     Raises:
         AloftError: the graph has no such parameter.

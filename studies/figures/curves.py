@@ -42,7 +42,7 @@ class Column:
 
 
 def draw_columns(title: str, notes: Sequence[str], columns: Sequence[Column]) -> Image:
-    """The figure as a picture, the columns side by side.
+    """Draw the figure as a picture, the columns side by side.
 
     ``notes`` are lines of text between the title and the panels.
     """
@@ -79,13 +79,13 @@ def draw_columns(title: str, notes: Sequence[str], columns: Sequence[Column]) ->
 
 
 BEFORE, AFTER = 0.6, 0.7
-"""What is shown before lift-off and after touchdown [s]."""
+"""Time shown before lift-off and after touchdown [s]."""
 AXES = ("x", "y", "z")
 MEASURED, PLANNED = COLOURS[0], COLOURS[1]
 
 
 def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
-    """CoM, momenta, torso pitch, contact force, joint velocities and torques of one jump."""
+    """Draw CoM, momenta, torso pitch, contact force, joint velocities and torques of one jump."""
     t, flight = trace.time, trace.flight_times
     shades = [Shade(*flight)] if flight else []
     start, end = flight or (float(t[0]), float(t[-1]))
@@ -156,7 +156,7 @@ def draw_jump(trace: Trace, robot: RobotDescription) -> Image:
 
 
 def jump_numbers(trace: Trace) -> Mapping[str, float]:
-    """The numbers that belong to the figure, by names that contain the units."""
+    """Return the numbers that belong to the figure, by names that contain the units."""
     com = trace.truth("com")[:, 2]
     flight = trace.flight
     numbers = {
@@ -182,7 +182,8 @@ RIGHT, LEFT = 0, 1
 
 
 def draw_push(arms: Mapping[str, Sequence[Trace]]) -> Image:
-    """The figure with both directions, +x first, and a curve for every arm. Only the flight is shown."""
+    """Draw the figure with both directions, +x first, and a curve for every arm. Only the flight is
+    shown."""
     columns = []
     for number, header in enumerate(("(a) push along +x", "(b) push along +y")):
         traces = {arm: found[number] for arm, found in arms.items() if len(found) > number}
@@ -202,7 +203,7 @@ def draw_push(arms: Mapping[str, Sequence[Trace]]) -> Image:
 
 
 def _column(header: str, axis: int, traces: Mapping[str, Trace]) -> Column:
-    """``axis`` is 0 for a push along x, 1 along y."""
+    """Make a column; ``axis`` is 0 for a push along x, 1 along y."""
     other, letter, about = (1, "x", "y") if axis == 0 else (0, "y", "x")
     rows: list[list[Curve]] = [[], [], [], [], []]
     shades: list[Shade] = []
@@ -261,7 +262,7 @@ def _push(trace: Trace, flight: slice) -> list[Shade]:
 
 
 def push_numbers(trace: Trace, axis: int) -> Mapping[str, float]:
-    """What the push changed and how far the feet moved, by names that contain the units."""
+    """Return the changes by the push and the motion of the feet, by names that contain the units."""
     ticks = trace.flight
     pushed = np.flatnonzero(np.abs(trace.signals["push.push.force"]).any(axis=1))
     if ticks is None or not len(pushed):

@@ -40,7 +40,7 @@ CURSOR = (204, 38, 51)
 
 @dataclass(frozen=True)
 class Camera:
-    """How a film is taken.
+    """The settings of a film.
 
     Attributes:
         width, height: of one run's picture [pixels].
@@ -76,7 +76,7 @@ class Plots:
         ]  # in pixels from below, and the times of its sides
 
     def picture(self, instant: float) -> Pixels:
-        """The panels with the line, (height, width, 3)."""
+        """Draw the panels with the line, (height, width, 3)."""
         from PIL import ImageDraw
 
         shown = self._image.copy()
@@ -138,17 +138,18 @@ class Take:
         self._distance = camera.distance or FRAMING * size + float(np.linalg.norm(travel))
 
     def row(self, instant: float) -> int:
-        """The tick that is shown at a time: the latest until then."""
+        """Return the tick that is shown at a time: the latest until then."""
         return int(np.clip(np.searchsorted(self.time, instant + 1e-9) - 1, 0, len(self.time) - 1))
 
     def view(self, row: int) -> View:
-        """Where the camera is."""
+        """Return the view of the camera."""
         at = self._center if self._middle is None else self._middle[row]
         place = (float(at[0]), float(at[1]), float(self._center[2]))
         return View(place, self._distance, self._camera.azimuth, self._camera.elevation)
 
     def arrows(self, row: int) -> Iterator[tuple[Array, Array]]:
-        """The forces: on the feet and of thrusters from where they act, a push to where it acts."""
+        """Yield the forces: on the feet and of thrusters from their points of action, a push to its
+        point."""
         for point, force in zip(self._points[row], self._forces[row], strict=True):
             if np.linalg.norm(force) * self._arrow > 0.01:
                 yield point, point + self._arrow * force
@@ -158,13 +159,14 @@ class Take:
                 yield point - self._arrow * force, point
 
     def text(self, row: int) -> str:
-        """What stands below the picture."""
+        """Return the caption below the picture."""
         phase = "" if self._phases is None else f"  {self._phases[row]}"
         return f"{self.caption}  {self.time[row]:.2f} s{phase}"
 
 
 def _named_phase(run: RecordedRun) -> list[str] | None:
-    """The name of the phase in each tick, of the first signal ``phase`` whose numbers have names."""
+    """Return the name of the phase in each tick, of the first signal ``phase`` whose numbers have
+    names."""
     for field in run.header.bus.fields:
         if (
             field.values
@@ -177,7 +179,7 @@ def _named_phase(run: RecordedRun) -> list[str] | None:
 
 
 def _smoothed(base: Array, time: Array) -> Array:
-    """The place of the base, averaged over ``FOLLOW_WINDOW``."""
+    """Return the place of the base, averaged over ``FOLLOW_WINDOW``."""
     period = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
     half = max(1, round(0.5 * FOLLOW_WINDOW / period))
     padded = np.concatenate([np.repeat(base[:1], half, 0), base, np.repeat(base[-1:], half, 0)])
@@ -188,7 +190,8 @@ def _smoothed(base: Array, time: Array) -> Array:
 
 
 def instants(takes: Sequence[Take], start: float | None, end: float | None, step: float) -> Array:
-    """The times of the pictures [s]; by default from the first tick to the longest run's last.
+    """Return the times of the pictures [s]; by default from the first tick to the longest run's
+    last.
 
     Raises:
         AloftError: there is no such time in any of the recordings.
@@ -210,7 +213,8 @@ def pictures(
     advance: Callable[[], None] = lambda: None,
     panels: Sequence[Panel] = (),
 ) -> Iterator[Image]:
-    """The picture at each time, with the runs side by side or in one, each over its caption, and plots at the right.
+    """Draw the picture at each time, with the runs side by side or in one, each over its caption,
+    and plots at the right.
 
     Raises:
         NoRendererError: there is nothing here to draw with.
@@ -240,7 +244,7 @@ def pictures(
 
 
 def _captioned(parts: Sequence[Pixels], texts: Sequence[str]) -> Image:
-    """Pictures side by side, each over its text."""
+    """Join pictures side by side, each over its text."""
     from PIL import Image as Images
     from PIL import ImageDraw, ImageFont
 
@@ -284,7 +288,7 @@ def write_film(path: Path, frames: Iterator[Image], rate: float) -> int:
 
 
 def _sample(frames: Sequence[Image]) -> Image:
-    """Some of the pictures below each other: one that has the colours of all."""
+    """Join some of the pictures, one below the other: one that has the colours of all."""
     from PIL import Image as Images
 
     some = frames[:: max(1, len(frames) // SAMPLES)]

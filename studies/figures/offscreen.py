@@ -37,7 +37,7 @@ PAINT = {
 FORCE = (0.80, 0.15, 0.20, 1.0)
 """The colour of a force."""
 ARROWS = 100
-"""How many forces there is room for."""
+"""Largest number of forces that can be drawn."""
 BLOCK, BONE = (0.78, 0.74, 0.66), (0.33, 0.36, 0.40)
 
 
@@ -47,7 +47,7 @@ class NoRendererError(AloftError):
 
 @dataclass(frozen=True)
 class View:
-    """Where the camera looks [m, world], from how far [m] and which way [deg]."""
+    """The camera's target [m, world], its distance [m] and its direction [deg]."""
 
     look_at: tuple[float, float, float]
     distance: float
@@ -91,7 +91,7 @@ class Offscreen:
         self, base: Array, quaternion: Array, joints: Array, view: View,
         arrows: Iterable[tuple[Array, Array]] = (),
     ) -> Pixels:  # fmt: skip
-        """The robot in a pose (quaternion x, y, z, w), (height, width, 3).
+        """Draw the robot in a pose (quaternion x, y, z, w), (height, width, 3).
 
         ``arrows`` are drawn from a first to a second point [m, world]. A robot whose base is fixed
         has joints only.
@@ -126,7 +126,7 @@ class Offscreen:
 
 
 def _context(width: int, height: int) -> Any:
-    """A new OpenGL context, made current."""
+    """Make a new OpenGL context current, and return it."""
     try:
         if sys.platform == "linux":
             from mujoco.egl import GLContext
@@ -142,8 +142,8 @@ def _context(width: int, height: int) -> Any:
 
 
 def _painted(robot: RobotDescription, scene: Terrain, width: int, height: int) -> Any:
-    """The simulator's own model with a floor pattern, lights, the surfaces of links, and colours and bones of those
-    without."""
+    """Return the simulator's own model with a floor pattern, lights, the surfaces of links, and
+    colours and bones of those without."""
     import mujoco
 
     spec = mujoco_spec(robot, scene=scene)

@@ -48,7 +48,7 @@ KEPT = (
 
 
 def push_task(direction: str, arm: str) -> str:
-    """The name of a push in the study."""
+    """Return the name of a push in the study."""
     return f"push {direction}, {arm}"
 
 
@@ -129,7 +129,7 @@ def _push(traces: Mapping[str, Trace]) -> tuple[Picture, Mapping[str, Any]]:
 def _frames(
     title: str, trace: Trace, row: StudyRow, view: View, robot: RobotDescription
 ) -> tuple[Picture, Mapping[str, Any]]:
-    """The figure of a run as frames."""
+    """Draw the figure of a run as frames."""
     names = ("base_position", "base_orientation", "joint_position")
     motion = Motion(trace.time, *(trace.truth(name) for name in names))
     end = float(trace.time[-1])
@@ -149,7 +149,7 @@ def _frames(
 
 
 def _plan(robot: RobotDescription) -> tuple[Picture, Mapping[str, Any]]:
-    """The figure of a planned somersault as frames."""
+    """Draw the figure of a planned somersault as frames."""
     from ...hal.simulated.scenes import flat, platform
     from ...planner.library.library import SHIPPED, PlanLibrary
     from ...planner.task.read_task import read_task
@@ -185,7 +185,7 @@ def _plan(robot: RobotDescription) -> tuple[Picture, Mapping[str, Any]]:
 
 
 def scene_of(cell: Cell) -> Terrain:
-    """The ground that a cell's simulated robot jumps on."""
+    """Return the ground that a cell's simulated robot jumps on."""
     checked = load_cell(cell.graph, cell.include, cell.overrides, cell.origin, cell.behind).checked
     params: Any = next(spec.params for spec in checked.blocks if spec.path == "robot")
     scene: Terrain = params.build_scene(None)
@@ -193,7 +193,7 @@ def scene_of(cell: Cell) -> Terrain:
 
 
 def rounded(numbers: Mapping[str, Any]) -> dict[str, Any]:
-    """The numbers with four significant digits, so that noise does not change files."""
+    """Round the numbers to four significant digits, so that noise does not change files."""
     return {
         name: float(f"{value:.4g}") if isinstance(value, float) else value
         for name, value in numbers.items()
@@ -204,7 +204,7 @@ Results = Mapping[str, Any]
 
 
 def page(results: Results) -> str:
-    """The whole page as Markdown."""
+    """Write the whole page as Markdown."""
     seeds = results["seeds"]
     parts = [
         "# The paper's figures, from our runs",
@@ -360,7 +360,7 @@ def _somersault(results: Results) -> str:
 
 
 def table(rows: Sequence[tuple[str, str, str]]) -> str:
-    """Rows of quantity, the paper's value and ours."""
+    """Format rows of quantity, the paper's value and ours."""
     lines = ["| | paper | ours |", "|---|---|---|"]
     return "\n".join([*lines, *(f"| {what} | {paper} | {ours} |" for what, paper, ours in rows)])
 

@@ -37,7 +37,7 @@ class Motion:
     joints: Array
 
     def at(self, instant: float) -> tuple[Array, Array, Array]:
-        """The pose nearest to a time."""
+        """Return the pose nearest to a time."""
         k = int(np.argmin(np.abs(self.time - instant)))
         return self.base[k], self.quaternion[k], self.joints[k]
 
@@ -60,7 +60,7 @@ def draw_strip(
     view: View,
     columns: int = 4,
 ) -> Image:
-    """The frames in rows, each with its text below, under a title and lines of notes.
+    """Draw the frames in rows, each with its text below, under a title and lines of notes.
 
     Raises:
         NoRendererError: there is nothing here to draw with.
@@ -92,7 +92,8 @@ def draw_strip(
 
 
 def moments_of(start: float, lift_off: float, touchdown: float, end: float) -> list[Moment]:
-    """Two frames before lift-off, two between it and touchdown, two of the landing until rest."""
+    """Choose two frames before lift-off, two between it and touchdown, two of the landing until
+    rest."""
     flight = touchdown - lift_off
     chosen = (
         (start, "stand"),

@@ -41,11 +41,11 @@ class Trace:
     signals: Mapping[str, Array]
 
     def truth(self, name: str) -> Array:
-        """A signal that only the simulator knows."""
+        """Return a signal that only the simulator knows."""
         return self.signals[f"robot.truth.{name}"]
 
     def plan(self, name: str) -> Array:
-        """A signal of the planned motion."""
+        """Return a signal of the planned motion."""
         return self.signals[f"plan.reference.{name}"]
 
     @property
@@ -96,7 +96,8 @@ def make_trace(task_and_job: tuple[str, Job]) -> Trace:
 
 
 def pitch_and_roll(quaternions: Array) -> tuple[Array, Array]:
-    """Pitch about y and roll about x [rad] of quaternions x, y, z, w (n, 4): yaw, pitch, roll."""
+    """Compute pitch about y and roll about x [rad] of quaternions x, y, z, w (n, 4): yaw, pitch,
+    roll."""
     x, y, z, w = np.moveaxis(np.asarray(quaternions, float), -1, 0)
     pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
     roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))

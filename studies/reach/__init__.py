@@ -1,1 +1,1 @@
-"""How far a robot jumps in every direction: what is planned, what lands, and what the motors could give."""
+"""A robot's reach in every direction: of plans, of jumps that land, and of the motors."""

@@ -16,12 +16,12 @@ KINDS = (
     ("planned", "planned by the recipe", COLOURS[5], 0.46),
     ("reached", "lands at 95 %", COLOURS[0], 0.22),
 )
-"""What the bars show, from the widest to the narrowest: key, label, colour and width."""
+"""The bars from the widest to the narrowest: key, label, colour and width."""
 
 
 def frontier_chart(found: Sequence[Mapping[str, Any]]) -> str:
-    """The chart as SVG text: one row a direction, the first at the top, its bars as shares of the
-    theoretical bound, and the values beside them."""
+    """Draw the chart as SVG text: one row a direction, the first at the top, its bars as shares of
+    the theoretical bound, and the values beside them."""
     from matplotlib.ticker import PercentFormatter
 
     with style():
@@ -102,7 +102,7 @@ def _reach_figure(found: Mapping[str, Any], beside: Mapping[str, Any]) -> Figure
 
 
 def _values(each: Mapping[str, Any]) -> str:
-    """A direction's ends; the time ran out before there was an end to those with a plus."""
+    """Format a direction's ends; a plus marks those at which the time ran out."""
     return " / ".join(
         f"{each[key]:g}{'' if each[f'{key}_ended'] else '+'}"
         for key in ("reached", "planned", "theory")

@@ -26,14 +26,14 @@ GOALS = {
     "up": 0.25, "ahead": 0.60, "back": 0.30, "aside": 0.35, "turn": math.radians(120.0),
     "step up": 0.12, "step down": 0.35,
 }  # fmt: skip
-"""What 100 % of each direction is in a pair [m, rad]: what is wanted of BRUCE at a rate of 95 %."""
+"""Goals at a rate of 95 % by direction [m, rad]: 100 % of each direction in a pair."""
 LOOSEST: Mapping[str, Any] = {"effort": 1.0, "margins": None, "foot_clearance": 0.02}
-"""What a task says besides for the theoretical bound: all of the motors' torque and speed, no
-margins but the 5 mrad at the joints without which no plan is valid, and feet that rise by 2 cm."""
+"""Task settings for the theoretical bound: all of the motors' torque and speed, no margins but the
+5 mrad at the joints without which no plan is valid, and feet that rise by 2 cm."""
 ROUND = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 """The lengths that are taken for steps, times a power of ten."""
 LONGEST = 2.0
-"""m, of a jump onto or off a step."""
+"""Largest length of a jump onto or off a step [m]."""
 
 
 @dataclass(frozen=True)
@@ -63,15 +63,16 @@ class Direction:
     robot: str = ""
 
     def value(self, rung: int) -> float:
-        """A rung's value in ``unit``."""
+        """Return a rung's value in ``unit``."""
         return round(rung * self.step * self.shown, 6)
 
     def task(self, rung: int) -> JumpTask:
-        """The task on a rung, as a user would ask for it."""
+        """Return the task on a rung, as a user would ask for it."""
         return make_task({"name": f"{self.name} {self.value(rung):g}", **self._said(rung)})
 
     def loosest(self, rung: int) -> JumpTask:
-        """The same with all that the motors have and without margins: for the theoretical bound."""
+        """Return the task with all that the motors have and without margins: for the theoretical
+        bound."""
         name = f"{self.name} {self.value(rung):g} at most"
         return make_task({"name": name, **self._said(rung), **LOOSEST})
 
@@ -81,14 +82,14 @@ class Direction:
 
 
 def round_length(length: float) -> float:
-    """The round length nearest to it [m], by its ratio; see ``ROUND``."""
+    """Return the round length nearest to it [m], by its ratio; see ``ROUND``."""
     power = 10.0 ** math.floor(math.log10(length))
     return round(power * min(ROUND, key=lambda each: abs(math.log(length / power / each))), 9)
 
 
 @dataclass(frozen=True)
 class JumpSizes:
-    """What the directions' lengths are made of [m].
+    """The lengths from which the directions are made [m].
 
     Attributes:
         scale: the length of the robot's legs, as a multiple of BRUCE's.
@@ -107,7 +108,7 @@ class JumpSizes:
 
 
 def single_directions(sizes: JumpSizes = JumpSizes(), robot: str = "") -> tuple[Direction, ...]:
-    """Up, ahead, back, aside, turned, and onto and off a step."""
+    """Return up, ahead, back, aside, turned, and onto and off a step."""
     rise, onto, off = sizes.rise, sizes.onto, sizes.off
     over = 0.5 * rise  # above a step; and so much of the rise is left off one
     down = rise / 1.5
@@ -161,11 +162,11 @@ DIRECTIONS: tuple[Direction, ...] = (
           lambda s: {"rise": 0.06 + s * GOALS["step up"], "distance_x": s * GOALS["ahead"],
                      "landing_height": s * GOALS["step up"]}, 5),
 )  # fmt: skip
-"""BRUCE's directions, in the order in which they are told."""
+"""BRUCE's directions, in the order of the report."""
 
 
 def sizes_of(robot: RobotDescription, bruce: RobotDescription, highest: float) -> JumpSizes:
-    """The lengths for a robot that can be planned to rise by ``highest`` [m] and no higher.
+    """Compute the lengths for a robot that can be planned to rise by ``highest`` [m] and no higher.
 
     Jumps rise as far as BRUCE's for their legs, but no further than half of ``highest``. Jumps onto and off a step
     are so much longer that the robot stands wholly on either side of the edge. The edge is midway for BRUCE, and for
@@ -178,8 +179,8 @@ def sizes_of(robot: RobotDescription, bruce: RobotDescription, highest: float) -
     beside = robot.name if robot.name != bruce.name else ""
 
     def over(length: float, number: int) -> tuple[float, float | None]:
-        """The length, or a greater one [m], with which the direction of that number is consistent where it begins,
-        and the edge."""
+        """Return the length, or a greater one [m], with which the direction of that number is
+        consistent at its start, and the edge."""
         length = _whole_steps(scale * length)
         while length < LONGEST:
             way = single_directions(JumpSizes(scale, rise, length, length), beside)[number]
@@ -197,8 +198,8 @@ def sizes_of(robot: RobotDescription, bruce: RobotDescription, highest: float) -
 
 
 def leg_length(robot: RobotDescription) -> float:
-    """The mean length of thigh and shank together [m]: of the two longest parts of each leg between joints, or
-    between the last joint and the ground.
+    """Compute the mean length of thigh and shank together [m]: of the two longest parts of each leg
+    between joints, or between the last joint and the ground.
 
     Raises:
         ValueError: the robot has no feet.
@@ -219,5 +220,5 @@ def leg_length(robot: RobotDescription) -> float:
 
 
 def _whole_steps(length: float) -> float:
-    """The length in whole steps of 5 cm [m]."""
+    """Round the length to whole steps of 5 cm [m]."""
     return round(0.05 * round(length / 0.05), 9)

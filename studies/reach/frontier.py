@@ -1,4 +1,4 @@
-"""The frontier: how far jumps in every direction land at 95 %, against what the motors could give.
+"""The frontier: the reach of jumps that land at 95 % in every direction, against that of the motors.
 
 Along each of a robot's directions three ends are looked for on one ladder of values:
 
@@ -47,12 +47,12 @@ from .search import (
 )
 
 MOST_NAMED = 3
-"""So many of the limits that bind are named at most."""
+"""Largest number of binding limits that are named."""
 
 
 def result_of(tries: Tries, runs: int) -> dict[str, Any]:
-    """A direction's ends in the unit that people read, why nothing further is reached, what binds
-    in the plan at each end, and every rung that was run.
+    """Return a direction's ends in the unit that people read, the reason why nothing further is
+    reached, the binding limits of the plan at each end, and every rung that was run.
 
     ``reached``, ``planned`` and ``theory`` are 0 where nothing was found; ``fails_at`` is the next
     rung that was tried above ``reached``, ``none`` where there is none; ``gaps`` are rungs below
@@ -106,8 +106,8 @@ def result_of(tries: Tries, runs: int) -> dict[str, Any]:
 
 
 def _failed(tries: Tries, runs: int) -> dict[int, str]:
-    """Every rung that failed and why, in their order: the runs' most frequent reason, or what kept
-    the planner from a plan."""
+    """Return every rung that failed with its reason, in their order: the runs' most frequent one,
+    or the obstacle to a plan."""
     found = {
         rung: f"no plan: {outcome.reason}"
         for rung, outcome in tries.recipe.items()
@@ -120,8 +120,8 @@ def _failed(tries: Tries, runs: int) -> dict[int, str]:
 
 
 def _reasons(outcomes: Iterable[Outcome]) -> list[tuple[str, int]]:
-    """The reasons of runs that failed, most frequent first; those that differ in numbers only count
-    as one, and the first of them is shown."""
+    """Return the reasons of runs that failed, most frequent first; those that differ in numbers
+    only count as one, and the first of them is shown."""
     shown: dict[str, str] = {}
     count = Counter[str]()
     for outcome in outcomes:
@@ -133,7 +133,7 @@ def _reasons(outcomes: Iterable[Outcome]) -> list[tuple[str, int]]:
 
 
 def _shares(outcomes: list[Outcome] | None) -> list[int] | None:
-    """How many of how many runs landed."""
+    """Return the number of runs that landed, and of all."""
     return None if outcomes is None else [sum(run.success for run in outcomes), len(outcomes)]
 
 
@@ -144,7 +144,7 @@ def _binds(outcome: Outcome | None) -> str:
 
 
 def _refused(outcomes: dict[int, Outcome], end: int) -> str:
-    """What keeps the planner from the next rung that it tried above an end."""
+    """Return the planner's objection to the next rung that it tried above an end."""
     above = [rung for rung, outcome in outcomes.items() if rung > end and not outcome.success]
     return outcomes[min(above)].reason if above else ""
 
@@ -163,7 +163,7 @@ def frontier(
     workers: int = 0,
     progress: Callable[[str], None] = lambda _: None,
 ) -> list[dict[str, Any]]:
-    """What ``result_of`` says of every direction; plans and what was tried are kept in ``folder``.
+    """Return ``result_of`` every direction; plans and tries are kept in ``folder``.
 
     ``progress`` is told each try, and what came of it.
     """
@@ -222,7 +222,7 @@ class _Jobs:
 
 
 def _told(tries: Tries, ask: Ask) -> str:
-    """A try and what came of it, as a line."""
+    """Describe a try and its outcome in a line."""
     way = tries.direction
     what = f"{way.name} {way.value(ask.rung):g} {way.unit}"
     if ask.kind == "run":
@@ -234,7 +234,7 @@ def _told(tries: Tries, ask: Ask) -> str:
 
 
 class _Keys:
-    """What outcomes are kept under: code and graph, then the task by its hash."""
+    """The keys of kept outcomes: code and graph, then the task by its hash."""
 
     def __init__(self, graph: JumpGraph) -> None:
         text = f"{code_fingerprint()}\n{load(graph.path, graph.settings).checked.text}"
@@ -254,7 +254,7 @@ class _Keys:
 
 def _known(way: Direction, ask: Ask, seeds: Sequence[int], journal: Journal,
            keys: _Keys) -> list[Outcome]:  # fmt: skip
-    """The kept runs of a rung in the order of the seeds, up to where there are enough."""
+    """Return the kept runs of a rung in the order of the seeds, up to where there are enough."""
     found = list[Outcome]()
     for seed in seeds:
         failed = sum(not each.success for each in found)
@@ -267,7 +267,7 @@ def _known(way: Direction, ask: Ask, seeds: Sequence[int], journal: Journal,
 
 def job_for(graph: JumpGraph, way: Direction, ask: Ask, seeds: Sequence[int], folder: Path,
             journal: Journal, keys: _Keys) -> PlanJob | RunJob | None:  # fmt: skip
-    """What is still to be done for a try; ``None`` if all of it is kept."""
+    """Return the job that is left of a try; ``None`` if all of it is kept."""
     plans = folder / "plans"
     if ask.kind != "run":
         if keys(way, ask) in journal.outcomes:

@@ -1,4 +1,4 @@
-"""How far any robot jumps, in some minutes: the frontier in seven directions, beside BRUCE's.
+"""The reach of any robot in some minutes: the frontier in seven directions, beside BRUCE's.
 
 The directions are BRUCE's at the robot's size (``directions.single_directions``). Upwards comes first,
 because the other jumps rise by no more than half of what can be planned there. Each direction gets so much
@@ -22,12 +22,12 @@ from .search import RATE, Effort, JumpGraph
 
 SEEDS = tuple(range(9000, 9004))
 MINUTES = 10.0
-"""Of two cores, for all directions; the shares below are for these."""
+"""Minutes of two cores for all directions; the shares below are for these."""
 PLANNED_CPU, RUNS_CPU, THEORY_CPU = 45.0, 75.0, 30.0
-"""s; after so much processor time no further solve, or run, is begun along one direction. The rest of the ten minutes
+"""Processor time after which no further solve, or run, is begun along one direction [s]. The rest of the ten minutes
 is for those that are under way then, and for what is compiled first."""
 QUARTER_TURN = 90.0
-"""deg; counts as one length of a leg."""
+"""Turn that counts as one length of a leg [deg]."""
 BRUCE = Path(__file__).with_name("bruce.json")
 """Written by ``docs/refresh.py frontier``, with the table in docs/frontier.md."""
 
@@ -42,7 +42,7 @@ def reach(
     minutes: float = MINUTES,
     progress: Callable[[str], None] = lambda _: None,
 ) -> dict[str, Any]:
-    """How far the robot jumps in every direction, as plain data.
+    """Measure the robot's reach in every direction, as plain data.
 
     Returns:
         ``robot``, ``mass_kg``, ``leg_length_m``, ``seeds``, ``rate``, ``minutes``, the processor time ``cpu_s`` that was
@@ -88,13 +88,14 @@ def reach(
 
 
 def in_legs(each: Mapping[str, Any], legs: float) -> dict[str, float]:
-    """A direction's ends in lengths of the ``legs`` [m], or in turns of 90 degrees."""
+    """Convert a direction's ends to lengths of the ``legs`` [m], or to turns of 90 degrees."""
     unit = QUARTER_TURN if each["unit"] == "deg" else 100.0 * legs
     return {key: round(each[key] / unit, 4) for key in ("reached", "planned", "theory")}
 
 
 def beside(found: Mapping[str, Any], robot: RobotDescription) -> dict[str, Any]:
-    """What the benchmark ``frontier`` has found of a robot's single directions, as ``bruce_reach`` gives it."""
+    """Return the results of the benchmark ``frontier`` for a robot's single directions, as
+    ``bruce_reach`` gives them."""
     singles = {way.name for way in single_directions()}
     legs = leg_length(robot)
     rows = [
@@ -106,6 +107,7 @@ def beside(found: Mapping[str, Any], robot: RobotDescription) -> dict[str, Any]:
 
 
 def bruce_reach() -> dict[str, Any]:
-    """BRUCE's reach: what the benchmark ``frontier`` has found with 20 seeds, for jumps of the same sizes."""
+    """Read BRUCE's reach: the results of the benchmark ``frontier`` with 20 seeds, for jumps of the
+    same sizes."""
     found: dict[str, Any] = json.loads(BRUCE.read_text(encoding="utf-8"))
     return found

@@ -1,4 +1,4 @@
-"""The search along one direction of the frontier: what is tried next, given the results so far.
+"""The search along one direction of the frontier: the next try, given the results so far.
 
 How far up a ladder something works is found with few tries. The searches are generators: they yield
 the rung to try, are sent whether it works, and return the highest that does, 0 for none. So they know
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ...planner.checking.plan_tests import active_limits
-from ...planner.checking.validity import InvalidPlanError, why_not
+from ...planner.checking.validity import InvalidPlanError, failure_text
 from ...planner.library.library import PlanLibrary, solve_and_check
 from ...planner.solving.solver_process import cpu_time
 from ...planner.task.files import JumpTaskError, PlanError
@@ -32,7 +32,7 @@ FAILURES = 2
 
 
 def furthest(start: int, most: int, good: int = 0) -> Generator[int, bool, int]:
-    """The last rung before one that fails, by strides that double, and then by bisection.
+    """Find the last rung before one that fails, by strides that double, and then by bisection.
 
     It takes for granted that the rungs up to ``good`` work, and that what fails once fails from
     there on. It begins with ``start``, in ``good`` + 1 to ``most``.
@@ -55,8 +55,8 @@ def furthest(start: int, most: int, good: int = 0) -> Generator[int, bool, int]:
 
 
 def outward(start: int, most: int) -> Generator[int, bool, int]:
-    """The highest rung that works, walking outwards from ``start`` to ``most`` one by one until
-    ``FAILURES`` in a row fail; then, if none has worked, inwards to the first that does."""
+    """Find the highest rung that works, walking outwards from ``start`` to ``most`` one by one
+    until ``FAILURES`` in a row fail; then, if none has worked, inwards to the first that does."""
     reached, failures, rung = 0, 0, start
     while rung <= most and failures < FAILURES:
         if (yield rung):
@@ -75,14 +75,14 @@ def outward(start: int, most: int) -> Generator[int, bool, int]:
 RATE = 0.95
 """The share of a rung's runs that have to land."""
 LEAST_RUNS = 4
-"""So many runs a rung gets at least; then it ends once it can no longer reach ``RATE``."""
+"""Least number of runs of a rung; then it ends once it can no longer reach ``RATE``."""
 FIRST_LOOK = 10
-"""With fewer runs wanted than these a rung ends at once when it can no longer reach ``RATE``."""
+"""Number of runs below which a rung ends at once when it can no longer reach ``RATE``."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is spent on a direction.
+    """The effort spent on a direction.
 
     Attributes:
         runs: of a rung.
@@ -110,7 +110,7 @@ class JumpGraph:
     settings: Mapping[str, Any]
 
     def run(self, task: JumpTask, plans: Path, seed: int) -> Outcome:
-        """One run of a task that is planned in a folder."""
+        """Make one run of a task that is planned in a folder."""
         given = task.model_dump(mode="json", exclude_unset=True)
         sets = {"plan.task": given, "plan.library": str(plans.absolute()), "robot.seed": seed}
         result = load(self.path, {**self.settings, **sets}).run(log=False)
@@ -142,13 +142,13 @@ class RunJob:
 
 
 def enough(done: int, failed: int, of: int) -> bool:
-    """Whether a rung needs no more runs: all are done, or too many of them failed."""
+    """Tell whether a rung needs no more runs: all are done, or too many of them failed."""
     allowed = of - required(of)
     return done >= of or (failed > allowed and (of < FIRST_LOOK or done >= LEAST_RUNS))
 
 
 def required(runs: int) -> int:
-    """How many of the runs have to land."""
+    """Return the number of runs that have to land."""
     return next(k for k in range(runs + 1) if k >= RATE * runs - 1e-9)
 
 
@@ -158,8 +158,8 @@ def _robot(name: str) -> RobotDescription:
 
 
 def make_plan(job: PlanJob) -> Outcome:
-    """Whether the task has a valid plan, which is then kept; metrics ``cpu_s`` and, for a plan,
-    ``binds``: what of the robot it uses to the full."""
+    """Plan the task and keep a valid plan; metrics ``cpu_s`` and, for a plan, ``binds``: the limits
+    of the robot that it uses to the full."""
     robot = _robot(job.robot)
     library = PlanLibrary(robot, job.folder, ())
     started = cpu_time()
@@ -167,14 +167,14 @@ def make_plan(job: PlanJob) -> Outcome:
         near = None if job.near is None else library.find(job.near)
         plan = solve_and_check(job.task, robot, near)
     except (InvalidPlanError, PlanError, JumpTaskError) as error:
-        return Outcome(False, why_not(error), metrics={"cpu_s": cpu_time() - started})
+        return Outcome(False, failure_text(error), metrics={"cpu_s": cpu_time() - started})
     spent = cpu_time() - started
     library.add(plan)
     return Outcome(True, "", metrics={"cpu_s": spent, "binds": list(active_limits(plan, robot))})
 
 
 def run_rung(job: RunJob) -> list[tuple[int, Outcome]]:
-    """The runs by seed in the graph's trial, in order, until there are ``enough``."""
+    """Make the runs in the graph's trial, by seed in order, until there are ``enough``."""
     done, failed, found = job.done, job.failed, list[tuple[int, Outcome]]()
     for seed in job.seeds:
         if enough(done, failed, job.of):
@@ -188,7 +188,7 @@ def run_rung(job: RunJob) -> list[tuple[int, Outcome]]:
 
 
 def do(job: PlanJob | RunJob) -> Outcome | list[tuple[int, Outcome]]:
-    """One job of either kind."""
+    """Do one job of either kind."""
     return make_plan(job) if isinstance(job, PlanJob) else run_rung(job)
 
 
@@ -204,9 +204,9 @@ class Ask:
 
 @dataclass
 class Tries:
-    """What was tried along a direction by its rung, and where each search ended. ``planned_ended``,
-    ``reached_ended`` and ``theory_ended`` are false where the effort's time stopped the search, which might go
-    further."""
+    """The tries along a direction by rung, and the end of each search. ``planned_ended``,
+    ``reached_ended`` and ``theory_ended`` are false where the effort's time stopped the search,
+    which might go further."""
 
     direction: Direction
     recipe: dict[int, Outcome] = field(default_factory=dict)
@@ -221,8 +221,8 @@ class Tries:
 
 
 def explore(tries: Tries, effort: Effort) -> Generator[Ask, None, None]:
-    """The tries along one direction, one after the other; what each found is in ``tries`` before
-    the next is asked for."""
+    """Yield the tries along one direction, one after the other; the result of each is in ``tries``
+    before the next is asked for."""
     way = tries.direction
     search = furthest(max(1, way.start // 2) if effort.quick else way.start, way.most)
     rung = next(search)
@@ -268,7 +268,7 @@ def explore(tries: Tries, effort: Effort) -> Generator[Ask, None, None]:
 
 
 def of_runs(tries: Tries) -> list[Outcome]:
-    """What all runs along a direction came to."""
+    """Return the outcomes of all runs along a direction."""
     return [run for runs in tries.runs.values() for run in runs]
 
 

@@ -217,8 +217,8 @@ def test_faults_for_programs(tmp_path: Path) -> None:
                     "  inertia: [1, 1, 1, 0, 0, 0]}]\njoints: []\n"
                     "profiles: {}\n")  # fmt: skip
     report = run_for_json("robot", "show", str(path), code=2)
-    assert report["reason"] == f"{path}: 2 faults in the robot's description"
-    assert report["faults"][0] == {
+    assert report["reason"] == f"{path}: 2 errors in the robot's description"
+    assert report["errors"][0] == {
         "file": str(path), "line": 3, "column": 25, "path": ["links", 0, "mass"],
         "message": "link a has a mass of -1 kg", "expected": "a positive number of kg",
         "found": "-1", "fix": "mass: 0.1",

@@ -15,7 +15,7 @@ from aloft.logs.viewing.viewer import ViewerError, start_viewer
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.links.observer import Observer
 from aloft.runtime.loading import load
-from aloft.runtime.placement.placed import place
+from aloft.runtime.placement.placed import split_over_machines
 
 from ..waiting import wait_for
 from .conftest import run_elsewhere, run_for_json, run_here
@@ -64,7 +64,7 @@ def test_machines_and_links_are_shown(running: Path) -> None:
     ):
         assert text in shown
     # a live view of the other machine's signals, from here
-    placed = place(load("graph.yaml"))
+    placed = split_over_machines(load("graph.yaml"))
     try:
         viewer = start_viewer("headless")
     except ViewerError as error:

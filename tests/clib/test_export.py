@@ -12,7 +12,7 @@ import pytest
 
 import aloft
 from aloft.clib.check import Checked, check
-from aloft.clib.library import Library
+from aloft.clib.library import SharedLibrary
 from aloft.clib.module import Status
 from aloft.clib.targets import TARGETS
 from aloft.clib.write import write_library
@@ -131,7 +131,7 @@ def test_the_rust_of_the_page_calls_the_library(written: Path, tmp_path: Path) -
     command = ["rustc", "--edition", "2021", "-D", "warnings", "-L", written.parent, "caller.rs"]
     subprocess.run(command, cwd=tmp_path, check=True)
     done = subprocess.run([tmp_path / "caller"], capture_output=True, text=True, check=True)
-    library = Library(written)
+    library = SharedLibrary(written)
     for tick, line in enumerate(done.stdout.splitlines()):
         library.inputs["wish"][...], library.inputs["measured"][...] = 1.0, 0.1 * tick
         library.step()
@@ -169,7 +169,7 @@ def test_a_library_needs_nothing_of_the_system_but_memory_and_mathematics(writte
 
 @needs_compiler
 def test_instances_are_independent_and_states_come_back(written: Path) -> None:
-    first, second = Library(written), Library(written)
+    first, second = SharedLibrary(written), SharedLibrary(written)
     first.inputs["wish"][...] = 1.0
     second.inputs["wish"][...] = -0.5
     for _ in range(7):
@@ -180,7 +180,7 @@ def test_instances_are_independent_and_states_come_back(written: Path) -> None:
     second.inputs["wish"][...] = 1.0
     assert [second.step() or float(second.outputs["force"][0]) for _ in range(5)] == forces
     first.reset()
-    assert bytes(first.memory) == bytes(Library(written).memory)
+    assert bytes(first.memory) == bytes(SharedLibrary(written).memory)
     with pytest.raises(AloftError, match="a state of pd has"):
         first.restore(kept[:-1])
 
@@ -188,7 +188,7 @@ def test_instances_are_independent_and_states_come_back(written: Path) -> None:
 @needs_compiler
 def test_a_live_parameter_changes_within_its_bounds(folder: Path) -> None:
     made = write_library(str(folder / "mass.yaml"), folder / "gain" / "gain", "mass")
-    library = Library(made.description)
+    library = SharedLibrary(made.description)
     library.inputs["controller/bound.y".replace("/", ".")][...] = 2.0
     assert (library.step(), library.outputs["y"].tolist()) == (0, [1.0])
     library.set("mass.gain[0]", 3.0)
@@ -202,7 +202,7 @@ def test_a_live_parameter_changes_within_its_bounds(folder: Path) -> None:
 
 @needs_compiler
 def test_wrong_calls_and_numbers_are_refused(written: Path) -> None:
-    library = Library(written)
+    library = SharedLibrary(written)
     name = ctypes.CDLL(str(written.parent / "libpd.so"))
     assert name.pd_step(None, None, None) == Status.BAD_INSTANCE
     room = np.zeros(library.memory.size, np.uint8)
@@ -270,7 +270,7 @@ def test_what_a_block_asks_of_python_is_a_status_with_its_name(tmp_path: Path) -
     made = write_library(
         str(tmp_path / "watched.yaml"), tmp_path / "watched", outputs=["careful.y", "bounded.ok"]
     )
-    library = Library(made.description)
+    library = SharedLibrary(made.description)
     found = []
     for given in (3.0, 12.0, 9.0, 3.0):
         library.inputs["given"][...] = given
@@ -314,7 +314,7 @@ GENERAL = Path(__file__).with_name("general_blocks.yaml")
 IN_PYTHON = {
     "blocks.ColouredNoise": "NumPy's random numbers", "blocks.WhiteNoise": "NumPy's random numbers",
     "blocks.External": "what Python sets; in a library it is an input",
-    "blocks.Policy": "a network of ONNX", "blocks.Library": "another library",
+    "blocks.Policy": "a network of ONNX", "blocks.CLibrary": "another library",
 }  # fmt: skip
 """The general blocks that no library has, and why."""
 

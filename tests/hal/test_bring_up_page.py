@@ -7,7 +7,7 @@ from collections import defaultdict
 from pathlib import Path
 from typing import get_args
 
-from aloft.hal.twin.faults import Kind
+from aloft.hal.twin.injected_faults import Kind
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "bring_up.md").read_text()

@@ -191,9 +191,9 @@ def test_sine_and_cosine_together_have_the_same_bits(angle: float) -> None:
 @given(st.floats(-1e100, 1e100), st.floats(-1e100, 1e100))
 def test_two_numbers_are_their_sum_and_their_product(a: float, b: float) -> None:
     with mpmath.workdps(700):
-        high, low = elementary.sum_of(a, b)
+        high, low = elementary.two_sum(a, b)
         assert mpmath.mpf(high) + mpmath.mpf(low) == mpmath.mpf(a) + mpmath.mpf(b)
-        high, low = elementary.product_of(a, b)
+        high, low = elementary.two_product(a, b)
         if a == 0.0 or b == 0.0 or abs(high) > 1e-200:
             assert mpmath.mpf(high) + mpmath.mpf(low) == mpmath.mpf(a) * mpmath.mpf(b)
 

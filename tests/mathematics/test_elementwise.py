@@ -23,6 +23,7 @@ KERNELS = {
     "**": elementwise.power, "<": elementwise.less, "<=": elementwise.less_equal,
     "==": elementwise.equal, "!=": elementwise.not_equal, "choose": elementwise.choose,
     "+": elementwise.add, "-": elementwise.subtract, "*": elementwise.multiply, "same": elementwise.positive,
+    "negative": elementwise.negative,
 }  # fmt: skip
 RANDOM = np.random.default_rng(5)
 SPECIAL = [0.0, -0.0, 1.0, -1.0, 0.5, 2.0, 3.0, -3.0, 100.0, 710.0, 5e-324, math.inf, -math.inf]

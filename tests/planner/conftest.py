@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from aloft.blocks.jumping.squat_jump import SquatJumpParameters, plan_squat_jump
-from aloft.blocks.signals import Phase
 from aloft.planner.models.exact_dynamics import ExactDynamics, joint_motion
+from aloft.planner.task.phase import Phase
 from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot

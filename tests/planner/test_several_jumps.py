@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aloft.blocks.signals import Phase
 from aloft.planner.checking.validity import check_plan
 from aloft.planner.drawing.picture import phases_of, plan_picture
 from aloft.planner.library.reference_table import reference_table
 from aloft.planner.problem.guess import ballistic_guess
 from aloft.planner.solving.solve import make_problem, solve_jump, with_ground_times, with_times
+from aloft.planner.task.phase import Phase
 from aloft.planner.task.plan import PlannedJump, read_plan, write_plan
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot

@@ -7,13 +7,13 @@ import pytest
 import yaml
 
 from aloft.robots.description import (
+    LocatedYaml,
     MotorRating,
-    PlacedYaml,
     RobotDescription,
     find_robot,
     read_description,
 )
-from aloft.robots.validation import RobotError, RobotFault
+from aloft.robots.validation import DescriptionError, RobotError
 
 from .validation.wrong_robots import hopper
 
@@ -97,9 +97,9 @@ links:
 """
 
 
-def read(folder: Path, text: str) -> PlacedYaml:
+def read(folder: Path, text: str) -> LocatedYaml:
     (folder / "robot.yaml").write_text(text)
-    return PlacedYaml.read(folder / "robot.yaml")
+    return LocatedYaml.read(folder / "robot.yaml")
 
 
 @pytest.mark.parametrize(
@@ -116,9 +116,9 @@ def test_the_place_of_a_value_or_of_what_holds_it(
 ) -> None:
     placed = read(tmp_path, TEXT)
     assert placed.place(path) == place
-    found = placed.placed(RobotFault(path, "wrong"))
+    found = placed.placed(DescriptionError(path, "wrong"))
     assert (found.line, found.column) == (place if place[0] else (2, 1))
-    said = RobotFault(path, "wrong", line=9, column=3)
+    said = DescriptionError(path, "wrong", line=9, column=3)
     assert placed.placed(said) is said
 
 
@@ -129,28 +129,28 @@ def test_what_a_file_holds(tmp_path: Path) -> None:
         assert not placed.holds(path)
     empty = read(tmp_path, "")
     assert empty.data is None and empty.place(()) == (0, 0)
-    fault = empty.placed(RobotFault((), "nothing"))
+    fault = empty.placed(DescriptionError((), "nothing"))
     assert (fault.line, fault.column) == (0, 0)
 
 
 def test_keys_that_stand_twice_are_faults_of_the_second(tmp_path: Path) -> None:
     placed = read(tmp_path, "name: a\nlinks:\n  - {mass: 1, mass: 2}\nname: b\n")
-    assert [(fault.line, fault.column) for fault in placed.faults] == [(3, 15), (4, 1)]
-    assert read(tmp_path, TEXT).faults == ()
+    assert [(fault.line, fault.column) for fault in placed.errors] == [(3, 15), (4, 1)]
+    assert read(tmp_path, TEXT).errors == ()
 
 
 def test_what_cannot_be_read(tmp_path: Path) -> None:
     with pytest.raises(RobotError) as caught:
         read(tmp_path, "name: [1, 2\nlinks: {\n")
-    (fault,) = caught.value.faults
+    (fault,) = caught.value.errors
     assert fault.message.startswith("this is no YAML: ") and fault.fix
     assert fault.line >= 2 and fault.column >= 1
     (tmp_path / "bytes.yaml").write_bytes(b"name: \xff\xfe")
     with pytest.raises(RobotError, match="is not UTF-8 text") as caught:
-        PlacedYaml.read(tmp_path / "bytes.yaml")
-    assert caught.value.faults[0].found.startswith("byte 0xff")
+        LocatedYaml.read(tmp_path / "bytes.yaml")
+    assert caught.value.errors[0].found.startswith("byte 0xff")
     with pytest.raises(RobotError, match=r"cannot read .*: No such file"):
-        PlacedYaml.read(tmp_path / "nowhere.yaml")
+        LocatedYaml.read(tmp_path / "nowhere.yaml")
 
 
 def test_held_joints_that_are_freed() -> None:

@@ -12,7 +12,7 @@ from aloft.logs.file.format import RecordedField
 from aloft.logs.viewing.signal_names import element_names, unit_of_element
 from aloft.planner.task.read_task import contradictions
 from aloft.planner.task.task import JumpTask
-from aloft.robots.validation import find_faults
+from aloft.robots.validation import find_errors
 from aloft.runtime.language.errors import BlockError
 
 from .limbed_robots import slider
@@ -72,16 +72,16 @@ def test_a_motion_beyond_a_slides_limits_or_its_motors_is_told_in_metres() -> No
         check_limits(ROBOT, {"joint_position": place, "joint_velocity": rate})
 
 
-def faults(motors: dict[str, Any], **profile: Any) -> list[str]:
+def errors(motors: dict[str, Any], **profile: Any) -> list[str]:
     data = ROBOT.model_dump(mode="json", exclude_unset=True)
     data["profiles"]["motor"] |= {"motors": motors, **profile}
-    return [fault.expected for fault in find_faults(data)]
+    return [fault.expected for fault in find_errors(data)]
 
 
 def test_ratings_of_motors_that_cannot_be_are_asked_for_in_their_units() -> None:
     wrong = {"peak_torque": -1.0}
-    assert faults({"*_length": wrong}) == ["a number of N from 0"]
-    assert faults({"left_*": wrong}) == ["a number of N m (N for a slide) from 0"]
-    assert faults({ROBOT.joints[0].name: wrong}) == ["a number of N m from 0"]
-    assert faults({}, peak_torque=-1.0) == ["a positive number of N m (N for a slide)"]
-    assert faults({"*_length": {"corner_speed": 40.0}}) == ["corner_speed below 30 m/s"]
+    assert errors({"*_length": wrong}) == ["a number of N from 0"]
+    assert errors({"left_*": wrong}) == ["a number of N m (N for a slide) from 0"]
+    assert errors({ROBOT.joints[0].name: wrong}) == ["a number of N m from 0"]
+    assert errors({}, peak_torque=-1.0) == ["a positive number of N m (N for a slide)"]
+    assert errors({"*_length": {"corner_speed": 40.0}}) == ["corner_speed below 30 m/s"]

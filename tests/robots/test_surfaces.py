@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.robots.description import Box, RobotError, TurnedPart, find_robot, read_description
+from aloft.robots.description import Box, RobotError, TurnedShape, find_robot, read_description
 from aloft.robots.kinematics import link_poses
 from aloft.robots.surfaces import (
     MOST_TRIANGLES,
@@ -50,7 +50,7 @@ def test_a_rounded_box_keeps_its_size_and_loses_its_corners(radius: float) -> No
 
 @pytest.mark.parametrize("profile", [((0.05, 0.0), (0.05, 0.2)), ((0.05, 0.2), (0.05, 0.0))])
 def test_a_turned_part_is_closed_and_lies_along_its_axis(profile) -> None:
-    surface = turned_surface(TurnedPart(profile=profile, axis=(0, 2, 0), position=(0, 1, 0)))
+    surface = turned_surface(TurnedShape(profile=profile, axis=(0, 2, 0), position=(0, 1, 0)))
     assert surface.corners[:, 1].min() == pytest.approx(1.0)
     assert surface.corners[:, 1].max() == pytest.approx(1.2)
     radius = np.linalg.norm(surface.corners[:, [0, 2]], axis=1)

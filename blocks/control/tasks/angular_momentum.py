@@ -26,7 +26,7 @@ class AngularGains(Parameters):
     )
     angular_by_size: bool = parameter(
         False,
-        text="whether the weight is that of a robot of 5 kg, and falls with the size of others",
+        text="the weight is that of a robot of 5 kg, and falls with the size of others",
     )
     track_angular_momentum: bool = parameter(
         False, text="track the target's angular momentum instead of damping all of it"

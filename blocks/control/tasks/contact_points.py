@@ -121,7 +121,7 @@ class ContactPoints(Task):
 
 
 def rolling_joint(robot: RobotDescription, foot: int) -> int | None:
-    """The joint that turns a foot about its lateral axis while the foot rolls over its toes.
+    """Return the joint that turns a foot about its lateral axis while the foot rolls over its toes.
 
     It is the leg's last hinge whose axis is nearly across the robot (within 45 degrees of y, at the
     zero pose). A point foot has none: it does not roll, and its leg's last hinge is the knee.
@@ -192,8 +192,8 @@ def planned_acceleration(
     joints: JointState,
     params: ContactGains,
 ) -> float:
-    """The acceleration that keeps a joint, by its index in the generalised ``velocity``, on the plan: feedforward and
-    feedback."""
+    """Return the acceleration that keeps a joint, by its index in the generalised ``velocity``, on the plan:
+    feedforward and feedback."""
     joint = velocity - (terms.velocity.shape[0] - joints.position.shape[0])
     found: float = (
         target.joint_acceleration[joint]

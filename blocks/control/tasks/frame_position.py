@@ -27,7 +27,7 @@ class FramePosition(FeedbackTask):
 
     params: Params
     size = 3
-    target = Input(PointTarget, text="where the frame should be, and how it should move")
+    target = Input(PointTarget, text="target of the frame's place and motion")
 
     @classmethod
     def unmet_requirements(cls, params: Params, robot: RobotDescription) -> Iterable[str]:

@@ -107,7 +107,7 @@ class Posture(FeedbackTask):
 
 
 def chosen_joints(robot: RobotDescription, params: PostureParameters) -> list[int]:
-    """The joints of the task, in the order of the description."""
+    """Return the joints of the task, in the order of the description."""
     names = [joint.name for joint in robot.joints]
     if params.joints:
         return [k for k, n in enumerate(names) if any(fnmatchcase(n, p) for p in params.joints)]

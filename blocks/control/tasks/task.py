@@ -32,7 +32,7 @@ from ..frames import FrameModel
 
 
 def _function(value: Any) -> FunctionType | None:
-    """The function of a static method."""
+    """Return the function of a static method."""
     function = value.__func__ if isinstance(value, staticmethod) else value
     return function if isinstance(function, FunctionType) else None
 
@@ -71,7 +71,7 @@ class Task:
     states: ClassVar[Mapping[str, Any]] = {}
 
     terms = Input(DynamicsTerms, text="the whole-body model at the present state")
-    target = Input(WholeBodyTarget, text="what to achieve")
+    target = Input(WholeBodyTarget, text="target of the whole body")
     phase = Input(PhaseState, text="the phase and the points in stance")
     joints = Input(JointState, text="joint angles and velocities")
 
@@ -104,14 +104,14 @@ class Task:
 
     @classmethod
     def own_inputs(cls) -> Mapping[str, Input[Any]]:
-        """The inputs that the controller does not have without this task."""
+        """Return the inputs that the controller does not have without this task."""
         return {
             name: port for name, port in cls.inputs.items() if Task.inputs.get(name) is not port
         }
 
     @classmethod
     def row_count(cls, params: Any, robot: RobotDescription) -> int:
-        """How many rows the task has for that robot with these parameters, those of ``stand``."""
+        """Return the number of rows of the task for that robot with these parameters, those of ``stand``."""
         return cls.size
 
     @classmethod
@@ -135,13 +135,13 @@ class Task:
         self.prepare()
 
     def calls(self) -> Sequence[KernelCall | PythonCall]:
-        """The calls that write the rows."""
+        """Return the calls that write the rows."""
         functions = [_function(getattr(type(self), name)) for name in self.kernels]
         return [call_of(self, function) for function in functions if function is not None]
 
 
 def _ports(cls: type[Task]) -> Mapping[str, Input[Any]]:
-    """The inputs that the body of a class declares."""
+    """Return the inputs that the body of a class declares."""
     return {name: port for name, port in vars(cls).items() if isinstance(port, Input)}
 
 
@@ -187,7 +187,7 @@ class FeedbackTask(Task):
     Params: ClassVar[type[Parameters]] = FeedbackGains
     kernels: ClassVar[tuple[str, ...]] = ("error", "jacobian")
     gains_prefix: ClassVar[str] = ""
-    """What the names of the three gains begin with."""
+    """The prefix of the names of the three gains."""
 
     def __init__(
         self,
@@ -229,7 +229,7 @@ def feedback_rows(
     damping: Array1D,
     rows: TaskRows,
 ) -> None:
-    """The desired values and weights of a ``FeedbackTask``; the gains are (n,) each."""
+    """Write the desired values and weights of a ``FeedbackTask``; the gains are (n,) each."""
     rows.desired[:] = e.feedforward + stiffness * e.value + damping * e.rate - drift
     rows.weights[:] = weight
 
@@ -242,7 +242,7 @@ class TaskChoice(Parameters):
 
     task: str = parameter(text="the name of one of aloft's tasks, or module:Class")
     name: str = parameter(
-        "", text="what the task's inputs are called after; by default the class in snake_case"
+        "", text="prefix of the task's inputs; by default the class in snake_case"
     )
     gains: dict[str, Any] = parameter({}, text="the task's parameters in all phases")
     stand: dict[str, Any] = parameter({}, text="other gains while standing and squatting")
@@ -272,7 +272,7 @@ class ChosenTask:
         return {port: f"{name}_{port}" for port in self.kind.own_inputs()}
 
     def params(self, phase: str, shared: Parameters) -> Any:
-        """The task's parameters in the phases called ``phase``; ``shared`` are the controller's gains.
+        """Return the task's parameters in the phases called ``phase``; ``shared`` are the controller's gains.
 
         Raises:
             TaskChoiceError: the entry sets a parameter that the task does not have, or a wrong value.
@@ -293,7 +293,7 @@ class ChosenTask:
 
 @cache
 def own_tasks() -> Mapping[str, type[Task]]:
-    """The tasks that a graph may choose by name: all that the modules of this package define."""
+    """Return the tasks that a graph may choose by name: all that the modules of this package define."""
     package = __name__.rpartition(".")[0]
     folder = str(Path(__file__).parent)
     names = sorted(each.name for each in pkgutil.iter_modules([folder]))
@@ -309,7 +309,7 @@ def own_tasks() -> Mapping[str, type[Task]]:
 def choose_tasks(
     entries: Sequence[str | TaskChoice], folders: Sequence[Path] = ()
 ) -> tuple[ChosenTask, ...]:
-    """The tasks of a list, in its order.
+    """Return the tasks of a list, in its order.
 
     Args:
         folders: the folders in which a user's modules are searched for, in this order.

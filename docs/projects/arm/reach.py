@@ -10,7 +10,7 @@ from aloft.runtime.language.block import Context, UnmetRequirement
 
 
 class Departure(Signal):
-    """Where the motion began."""
+    """The state in which the motion began."""
 
     position = Field("n_joints", unit="rad", text="joint angles in the first tick")
     time = Field(unit="s", text="time since then")
@@ -41,7 +41,7 @@ class Reach(Block):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """One target for every joint, inside its limits."""
+        """Require one target for every joint, inside its limits."""
         robot = context.robot
         count = len(robot.joints)
         if len(params.target) != count:
@@ -60,7 +60,7 @@ class Reach(Block):
 
     @classmethod
     def example_parameters(cls) -> Mapping:
-        """For the conformance suite."""
+        """Return an example for the conformance suite."""
         return {"target": [0.1, 0.1, 0.1, 0.1], "duration": 0.01}
 
     def setup(self) -> None:
@@ -86,5 +86,5 @@ class Reach(Block):
         departure.time += self.period
 
     def metrics(self) -> Mapping:
-        """How far the worst joint is from its target, as measured."""
+        """Report the worst joint's distance from its target, as measured."""
         return {"target_error_rad": float(np.abs(self.joints.position - self._target).max())}

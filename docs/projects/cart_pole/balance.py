@@ -43,7 +43,7 @@ class Balance(Block):
         return self.robot.motors.peak_torque > 0.0
 
     def linear_model(self) -> tuple[np.ndarray, np.ndarray]:
-        """The matrices A and B of x+ = A x + B torque with x = (q, q'), from tick to tick."""
+        """Return the matrices A and B of x+ = A x + B torque with x = (q, q'), from tick to tick."""
         import pinocchio
 
         built = build_pinocchio_model(self.robot)
@@ -84,7 +84,7 @@ class Balance(Block):
         return gains
 
     def step(self) -> None:
-        """Torques from the measured state."""
+        """Compute torques from the measured state."""
         n, command = len(self._state) // 2, self.command
         self._state[:n] = self.joints.position
         self._state[n:] = self.joints.velocity
@@ -97,5 +97,5 @@ class Balance(Block):
         command.mode[()] = CommandMode.ACTIVE
 
     def metrics(self) -> Mapping:
-        """How far the joints are from zero at the end, as measured."""
+        """Report the joints' distance from zero at the end, as measured."""
         return {"largest_position": float(np.abs(self.joints.position).max())}

@@ -25,7 +25,7 @@ class SwingUp(Balance):
     params: Params
 
     def step(self) -> None:
-        """One tick."""
+        """Make one tick."""
         place, angle = self.joints.position
         speed, turning = self.joints.velocity
         turned = (angle + np.pi) % (2 * np.pi) - np.pi

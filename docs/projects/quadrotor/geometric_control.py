@@ -18,7 +18,7 @@ GRAVITY = 9.81
 
 
 class FlightMode(IntEnum):
-    """What the controller follows."""
+    """The quantity that the controller follows."""
 
     OFF = 0
     """Nothing: the rotors are off."""
@@ -29,7 +29,7 @@ class FlightMode(IntEnum):
 
 
 class FlightTarget(Signal):
-    """Where the quadrotor should be."""
+    """The desired motion of the quadrotor."""
 
     mode = Field(dtype="int64", values=FlightMode, text="see FlightMode")
     position = Field(3, unit="m", frame="world", text="base origin")
@@ -53,7 +53,7 @@ class Airframe(Signal):
 
 
 class FlightScratch(Signal):
-    """Room for a tick."""
+    """Scratch memory of one tick."""
 
     rotation = Field((3, 3), text="R")
     wanted = Field((3, 3), text="R_d")
@@ -69,7 +69,7 @@ class FlightScratch(Signal):
 
 
 class Disturbance(Signal):
-    """What position errors that last say of forces that nobody knows."""
+    """The estimate of unknown forces from lasting position errors."""
 
     acceleration = Field(3, unit="m/s^2", frame="world", text="that makes up for them")
 
@@ -128,7 +128,7 @@ class GeometricController(Block):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """A rigid body whose thrusters push along its z and turn it about all axes."""
+        """Require a rigid body whose thrusters push along its z and turn it about all axes."""
         robot = context.robot
         if robot.joints:
             yield UnmetRequirement(f"{robot.name} has joints", fix="weld: ['*'] in its description")
@@ -210,7 +210,8 @@ class GeometricController(Block):
 
 
 def wrenches(robot) -> np.ndarray:
-    """Force along z [N] and moments about the centre of mass [N m] for each newton of every thruster, (4, n)."""
+    """Compute force along z [N] and moments about the centre of mass [N m] for each newton of every
+    thruster, (4, n)."""
     com, columns = np.array(robot.links[0].com), []
     for each in robot.thrusters.values():
         axis = np.array(each.axis)
@@ -221,7 +222,8 @@ def wrenches(robot) -> np.ndarray:
 
 @kernel
 def point(force: Array1D, heading: float, out: Array2D) -> None:
-    """The rotation (3, 3) whose z is along the ``force`` and whose x is towards the ``heading`` [rad]."""
+    """Compute the rotation (3, 3) whose z is along the ``force`` and whose x is towards the
+    ``heading`` [rad]."""
     size = (force @ force) ** 0.5
     z0, z1, z2 = force[0] / size, force[1] / size, force[2] / size
     sine, cosine = sincos(heading)
@@ -238,8 +240,9 @@ def point(force: Array1D, heading: float, out: Array2D) -> None:
 def force_limits(
     wrench: Array1D, share: Array2D, most: Array1D, tilting: float, turning: float
 ) -> tuple[float, float]:
-    """The least and the largest force [N] along z with which rotors give ``tilting`` times the moments about x and y
-    and ``turning`` times that about z; the first is above the second where there is none."""
+    """Return the least and the largest force [N] along z with which rotors give ``tilting`` times
+    the moments about x and y and ``turning`` times that about z; the first is above the second
+    where there is none."""
     low, high = -1e9, 1e9
     for k in range(most.shape[0]):
         moments = tilting * (share[k, 1] * wrench[1] + share[k, 2] * wrench[2])
@@ -251,7 +254,8 @@ def force_limits(
 
 @kernel
 def allocate(wrench: Array1D, share: Array2D, most: Array1D, thrust: Array1D) -> None:
-    """The ``thrust`` [N] (n,) of rotors that give force and moments ``wrench`` (4,), as far as they can."""
+    """Compute the ``thrust`` [N] (n,) of rotors that give force and moments ``wrench`` (4,), as far
+    as they can."""
     tilting, turning = 1.0, 1.0
     low, high = force_limits(wrench, share, most, 1.0, 1.0)
     if low > high:

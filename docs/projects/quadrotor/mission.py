@@ -22,11 +22,11 @@ TO_SPARE = 0.8
 PEAK = 10.0 / math.sqrt(3.0)
 """The largest second derivative of 10 s^3 - 15 s^4 + 6 s^5."""
 PRESSED = 0.1
-"""How far the target has gone below the robot when that has landed [m]."""
+"""Depth of the target below the robot that marks the landing [m]."""
 
 
 class FlightPhase(IntEnum):
-    """What the flight is at."""
+    """The phases of the flight."""
 
     WAIT = 0
     RISE = 1
@@ -51,13 +51,13 @@ class Progress(Signal):
 
 
 class Flown(Signal):
-    """What the flight is at."""
+    """The present phase of the flight."""
 
     phase = Field(dtype="int64", values=FlightPhase, text="see FlightPhase")
 
 
 class MissionScratch(Signal):
-    """Room for a tick."""
+    """Scratch memory of one tick."""
 
     goal = Field(3, text="where a motion ends")
     speed = Field(3, text="how fast it ends")
@@ -104,7 +104,7 @@ class Mission(Block):
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
-        """Rotors that give the boost and the flip, with some to spare for steering."""
+        """Require rotors that give the boost and the flip, with some to spare for steering."""
         robot, about = context.robot, 0 if params.axis == "roll" else 1
         most = np.array([each.max_thrust for each in robot.thrusters.values()])
         speed = 0.5 * GRAVITY * params.flip
@@ -127,11 +127,11 @@ class Mission(Block):
 
     @classmethod
     def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
-        """What a score needs to know of the flight."""
+        """Return the values of the flight that a score needs."""
         return {"height": params.height, "hover": params.hover, "axis": params.axis}
 
     def setup(self) -> None:
-        """Which axis it flips about."""
+        """Choose the axis of the flip."""
         self.about = 0 if self.params.axis == "roll" else 1
 
     @kernel
@@ -198,7 +198,7 @@ class Mission(Block):
 
 @kernel
 def advance(base: BaseState, p: Progress, params: Mission.Params) -> None:
-    """Go on to the next phase where the present one is over."""
+    """Enter the next phase where the present one has ended."""
     over = False
     if p.phase == FlightPhase.WAIT:
         over = p.time >= params.wait
@@ -231,7 +231,8 @@ def advance(base: BaseState, p: Progress, params: Mission.Params) -> None:
 
 @kernel
 def move(p: Progress, goal: Array1D, speed: Array1D, duration: float, t: FlightTarget) -> None:
-    """The polynomial from where the phase began to a ``goal`` [m], where it ends with a ``speed`` [m/s]."""
+    """Set the target on the polynomial from the phase's start to a ``goal`` [m], which it passes
+    with a ``speed`` [m/s]."""
     time = min(p.time, duration)
     for k in range(3):
         way, first, last = goal[k] - p.position[k], p.velocity[k], speed[k]

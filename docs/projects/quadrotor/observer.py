@@ -1,9 +1,9 @@
-"""Where the quadrotor is: its IMU, corrected by a motion capture system."""
+"""Observer of a quadrotor's state: its IMU, corrected by a motion capture system."""
 
 import math
 
 from aloft import Block, Field, Input, Output, Parameters, Signal, State, live_parameter
-from aloft.blocks.signals import BaseState, ImuReading, PlaceMeasurement
+from aloft.blocks.signals import BaseState, ImuReading, PoseMeasurement
 from aloft.mathematics.elementary import atan2
 from aloft.mathematics.kernel import kernel
 from aloft.mathematics.rotations import from_euler, integrate, rotate, rotate_back, tilt, wrap, yaw
@@ -17,7 +17,7 @@ STEEPEST = math.radians(60.0)
 
 
 class Observed(Signal):
-    """What the observer believes, and what it believed."""
+    """The observer's present and past estimates."""
 
     started = Field(dtype="bool", text="whether there was a first measurement")
     position = Field(3, unit="m", frame="world", text="base origin")
@@ -32,7 +32,7 @@ class Observed(Signal):
 
 
 class ObserverScratch(Signal):
-    """Room for a tick."""
+    """Scratch memory of one tick."""
 
     rate = Field(3, text="angular velocity without bias")
     force = Field(3, text="specific force in the world")
@@ -64,25 +64,25 @@ class Observer(Block):
     params: Params
     scratch: ObserverScratch
     imu = Input(ImuReading, text="gyroscope and accelerometer")
-    place = Input(PlaceMeasurement, text="what is measured from outside")
+    pose = Input(PoseMeasurement, text="what is measured from outside")
     base = Output(BaseState, text="pose and velocity of the base")
     observed = State(Observed, text="the estimate")
 
     @kernel
     @staticmethod
     def step(
-        imu: ImuReading, place: PlaceMeasurement, base: BaseState, observed: Observed,
+        imu: ImuReading, pose: PoseMeasurement, base: BaseState, observed: Observed,
         params: Params, scratch: ObserverScratch, clock: Clock, period: float,
     ) -> None:  # fmt: skip
-        if place.number > 0 and not observed.started:
+        if pose.number > 0 and not observed.started:
             observed.started = True
-            observed.last, observed.last_time = place.number, place.time
-            observed.position[:] = place.position
+            observed.last, observed.last_time = pose.number, pose.time
+            observed.position[:] = pose.position
             # At rest the accelerometer says what is level.
             x, y, z = imu.specific_force[0], imu.specific_force[1], imu.specific_force[2]
             scratch.turn[0] = atan2(y, z)
             scratch.turn[1] = atan2(-x, math.sqrt(y * y + z * z))
-            scratch.turn[2] = place.heading
+            scratch.turn[2] = pose.heading
             from_euler(scratch.turn, observed.orientation)
         if observed.started:
             scratch.rate[:] = imu.angular_velocity - observed.gyro_bias
@@ -92,10 +92,10 @@ class Observer(Block):
             observed.position[:] += period * observed.velocity
             observed.velocity[:] += period * scratch.force
             observed.velocity[2] -= period * GRAVITY
-        here, taken = clock.tick % PAST, round(place.time / clock.base_period)
+        here, taken = clock.tick % PAST, round(pose.time / clock.base_period)
         remember(observed, here)
-        if place.number > observed.last and 0 <= clock.tick - taken < PAST:
-            correct(place, observed, params, scratch, taken % PAST)
+        if pose.number > observed.last and 0 <= clock.tick - taken < PAST:
+            correct(pose, observed, params, scratch, taken % PAST)
             remember(observed, here)
         base.position[:] = observed.position
         base.orientation[:] = observed.orientation
@@ -115,14 +115,14 @@ def remember(observed: Observed, here: int) -> None:
 
 @kernel
 def correct(
-    place: PlaceMeasurement, observed: Observed, params: Observer.Params,
+    pose: PoseMeasurement, observed: Observed, params: Observer.Params,
     scratch: ObserverScratch, then: int,
 ) -> None:  # fmt: skip
     """Correct the estimate by a measurement that was taken in the remembered tick ``then``."""
-    share = min(place.time - observed.last_time, 0.25 / params.bandwidth)
-    observed.last, observed.last_time = place.number, place.time
+    share = min(pose.time - observed.last_time, 0.25 / params.bandwidth)
+    observed.last, observed.last_time = pose.number, pose.time
     w, error, turn = params.bandwidth, scratch.error, scratch.turn
-    error[:] = place.position - observed.past_position[then]
+    error[:] = pose.position - observed.past_position[then]
     observed.position[:] += 4.0 * w * share * error
     observed.velocity[:] += 6.0 * w**2 * share * error
     force = scratch.force
@@ -132,7 +132,7 @@ def correct(
     turn[2] = force[0] * error[1] - force[1] * error[0]
     turn[:] = 4.0 * w**3 * share / size * turn
     if observed.past_tilt[then] < STEEPEST:
-        turn[2] += params.heading_rate * share * wrap(place.heading - observed.past_heading[then])
+        turn[2] += params.heading_rate * share * wrap(pose.heading - observed.past_heading[then])
     rotate_back(observed.orientation, turn, scratch.body)
     observed.gyro_bias[:] -= 0.25 * w * scratch.body
     integrate(observed.orientation, scratch.body, 1.0, observed.orientation)

@@ -12,7 +12,7 @@ from aloft.mathematics.rotations import tilt
 
 
 class FlightRecord(Signal):
-    """What the judgement needs."""
+    """The figures that the judgement needs."""
 
     ticks = Field(dtype="int64", text="ticks so far")
     pad = Field(3, unit="m", frame="world", text="where the robot stood")
@@ -69,7 +69,7 @@ class FlightScore(Block):
 
     @classmethod
     def example_parameters(cls) -> Mapping:
-        """For the conformance suite."""
+        """Return an example for the conformance suite."""
         return {"height": 1.5, "hover": 2.0}
 
     def setup(self) -> None:
@@ -115,7 +115,7 @@ class FlightScore(Block):
             self.request_stop(f"judged at {self.time:.2f} s")
 
     def metrics(self) -> Mapping:
-        """The judgement and its figures."""
+        """Return the judgement and its figures."""
         r = self.record
         failure = next((text for holds, text in self._judge() if not holds), None)
         return {

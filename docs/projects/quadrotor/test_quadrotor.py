@@ -27,7 +27,7 @@ MOST = np.full(4, 7.0)
 
 
 def controller(**target) -> np.ndarray:
-    """What the controller asks of rotors that hover, for a robot that is level at the origin."""
+    """Return the command to the rotors in hover, for a robot that is level at the origin."""
     bench = BlockBench(GeometricController, {"lead": 1.0, "trim_rate": 0.0}, robot=ROBOT)
     bench.set("base", orientation=[0.0, 0.0, 0.0, 1.0])
     bench.set("thrusters", thrust=WEIGHT / 4)
@@ -82,7 +82,7 @@ def test_the_observer_finds_tilt_and_bias_that_the_imu_does_not_know():
     bias = np.array([0.01, -0.02, 0.015])
     bench.set("imu", specific_force=[0.0, 0.0, 9.81], angular_velocity=bias)
     for tick in range(5000):
-        bench.set("place", number=tick // 5 + 1, time=0.01 * (tick // 5), position=[1.0, 2.0, 0.5])
+        bench.set("pose", number=tick // 5 + 1, time=0.01 * (tick // 5), position=[1.0, 2.0, 0.5])
         bench.step()
     base = bench.get("base")
     assert base.position == pytest.approx([1.0, 2.0, 0.5], abs=1e-4)

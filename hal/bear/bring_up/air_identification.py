@@ -34,7 +34,7 @@ class AirMotion(NamedTuple):
 
     @classmethod
     def allocate(cls, robot: RobotDescription, count: int, on: list[int]) -> Self:
-        """Room for a motion of ``count`` exchanges."""
+        """Allocate the arrays of a motion of ``count`` exchanges."""
         n = len(robot.joints)
         position, velocity, torque = np.zeros((3, count, n))
         rate, force = np.zeros((2, count, 3))
@@ -49,7 +49,7 @@ class JointFriction(NamedTuple):
 
 
 def joint_inertia(robot: RobotDescription, position: Array) -> Array:
-    """What every joint turns [kg m^2] while the base and the other joints rest, (n_joints,)."""
+    """Return the inertia that every joint turns while the base and the other joints rest [kg m^2], (n_joints,)."""
     import pinocchio as pin
 
     model = build_pinocchio_model(robot).model

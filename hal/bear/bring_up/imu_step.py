@@ -21,7 +21,7 @@ AXES_ERROR = 0.35
 SQUARE_ERROR = 0.1
 """A board that is this near to a mounting along the robot's axes is taken for mounted so [rad]."""
 PLACE_ERROR = 0.004
-"""How far the board may be from its told place [m], for a rule."""
+"""Largest error of the board's stated place [m], for a rule."""
 STILL_PACKETS = 50
 POLLS = 20000
 _SIDES = (
@@ -81,7 +81,7 @@ def check_imu(session: Session) -> StepReport:
 
 
 def _mounting(force: Array, turned: Array, report: StepReport) -> Array | None:
-    """The rotation from the base's axes to the board's (3, 3) that explains both sensors; columns are the
+    """Return the rotation from the base's axes to the board's (3, 3) that explains both sensors; columns are the
     robot's axes in the board's frame. ``None`` if there is none, which is noted."""
     axes, spins = _nearest_rotation(force), _nearest_rotation(turned)
     straight = min(_straightness(axes, force), _straightness(spins, turned))
@@ -110,7 +110,7 @@ def _mounting(force: Array, turned: Array, report: StepReport) -> Array | None:
 
 
 def _nearest_rotation(measured: Array, known: Array | None = None) -> Array:
-    """The rotation that turns the columns of ``known`` nearest to those of ``measured`` (Kabsch)."""
+    """Return the rotation that turns the columns of ``known`` nearest to those of ``measured`` (Kabsch)."""
     u, _, v = np.linalg.svd(measured @ (np.eye(3) if known is None else known).T)
     keep = np.diag([1.0, 1.0, np.linalg.det(u) * np.linalg.det(v)])
     rotation: Array = u @ keep @ v
@@ -118,12 +118,12 @@ def _nearest_rotation(measured: Array, known: Array | None = None) -> Array:
 
 
 def _angle_between(one: Array, other: Array) -> float:
-    """By how much two rotations (3, 3) differ [rad]."""
+    """Return the angle between two rotations (3, 3) [rad]."""
     return float(np.arccos(np.clip(0.5 * (np.trace(one.T @ other) - 1.0), -1.0, 1.0)))
 
 
 def _straightness(rotation: Array, measured: Array) -> float:
-    """The least cosine between a measured column and that of the rotation."""
+    """Return the least cosine between a measured column and that of the rotation."""
     sizes = np.linalg.norm(measured, axis=0)
     return float(((rotation * measured).sum(axis=0) / sizes).min())
 
@@ -162,7 +162,7 @@ def _millimetres(place: Array) -> str:
 
 
 def _words(axes: Array) -> str:
-    """Where each axis of the board points, in words; columns are the robot's axes in its frame."""
+    """Describe the direction of each axis of the board in words; columns are the robot's axes in its frame."""
     ways = (("forward", "backward"), ("left", "right"), ("up", "down"))
     named = []
     for k, axis in enumerate("xyz"):
@@ -174,7 +174,7 @@ def _words(axes: Array) -> str:
 
 
 def _mean_force(session: Session) -> Array | None:
-    """The mean specific force of some packets [m/s^2]; ``None`` if none come."""
+    """Return the mean specific force of some packets [m/s^2]; ``None`` if none come."""
     total, count = np.zeros(3), 0
     session.board.poll()
     for _ in range(POLLS):
@@ -187,7 +187,7 @@ def _mean_force(session: Session) -> Array | None:
 
 
 def _turn(session: Session, request: Request) -> Array:
-    """The gyroscope's integral during a turn [rad], (3,)."""
+    """Return the gyroscope's integral during a turn [rad], (3,)."""
     angle = np.zeros(3)
     session.board.poll()
 

@@ -29,19 +29,20 @@ LARGEST_SHARE = 0.06
 RISE = 0.15
 """The time from the first to the largest share [s]."""
 TURNED = 0.02
-"""How far a motor must turn to show its direction [rad]."""
+"""Least turn of a motor that shows its direction [rad]."""
 SILENT_FOR = 3.0
-"""How long nothing is written to a drive, in times of its watchdog."""
+"""Time without a write to a drive, in times of its watchdog."""
 SWING, SLOW = 0.12, 0.12
 """Amplitudes of the two waves of a joint [rad]."""
 SLOW_RATE, SWING_RATES = 0.7, (2.0, 6.0)
 """The frequency of the slow wave, which shows the friction, and the lowest and highest of the swing [Hz]."""
 SWING_TORQUE = 0.4
-"""What the inertia asks of the motor in the swing, which shows its torque constant [N m]: several times the friction."""
+"""Torque that the inertia asks of the motor in the swing, which shows its torque constant [N m]: several times the
+friction."""
 WAVE_TIME = 1.5
-"""How long a joint is moved [s]."""
+"""Duration of a joint's motion [s]."""
 APPROACH = 0.5
-"""How long it takes to come to the middle of the waves, and to grow them [s]."""
+"""Time to reach the middle of the waves, and to grow them [s]."""
 STIFFNESS, DAMPING = 12.0, 0.3
 """Of the drives that move it, at their outputs [N m/rad, N m s/rad]."""
 CONSTANT_ERROR = 0.2
@@ -49,19 +50,19 @@ CONSTANT_ERROR = 0.2
 WRITTEN_ERROR = 0.5
 """The share up to which another torque constant is written into the file."""
 FRICTION_FACTOR = 2.0
-"""How many times the described friction a joint may have: more is a fault of its bearing or gear."""
+"""Largest friction of a joint, in times of that described: more is a fault of its bearing or gear."""
 FRICTION_ERROR = 0.5
 """The share of the described friction that this test cannot tell: no more than that is compensated."""
 FRICTION_SPEED = 3.0
 """The speed at which frictions are compared, Coulomb and viscous together [rad/s]."""
 HOLD_TIME = 1.0
-"""How long all drives hold the standing pose in the air [s]."""
+"""Time for which all drives hold the standing pose in the air [s]."""
 HELD_WITHIN, STILL_RATE = 0.3, 0.5
-"""How far a motor may be from its goal [rad], and how fast it may turn, root mean square [rad/s]."""
+"""Largest distance of a motor from its goal [rad], and its largest speed, root mean square [rad/s]."""
 
 
 def check_currents(session: Session) -> StepReport:
-    """Give one motor after the other a little current both ways: does it turn as its encoder says?"""
+    """Give one motor after the other a little current both ways, and check that it turns as its encoder reads."""
     report = StepReport()
     if not _hang(session, report):
         return report
@@ -94,7 +95,7 @@ def check_currents(session: Session) -> StepReport:
 
 
 def _push(session: Session, name: str, next_cycle: Callable[[], bool]) -> float:
-    """How far the motor turns with its current, both ways together [rad]."""
+    """Return the angle by which the motor turns with its current, both ways together [rad]."""
     hardware = session.hardware
     limit = hardware.drives.current_limit
     count = round(RISE / hardware.bus.period)
@@ -314,7 +315,7 @@ def hold_in_the_air(session: Session) -> StepReport:
 
 
 def _hang(session: Session, report: StepReport) -> bool:
-    """Have the robot hung up, with all drives in damping; says whether they are, and may be switched on."""
+    """Have the robot hung up, with all drives in damping; return whether they are, and may be switched on."""
     missing = session.hardware.missing_calibration()
     if missing:
         report.add(

@@ -1,4 +1,4 @@
-"""What the steps of a bring-up share: the devices, the person who helps, discrepancies and the record."""
+"""The common ground of a bring-up's steps: the devices, the person who helps, discrepancies and the record."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from ..configuration import Hardware
 from ..sense_board import SenseBoard
 
 PACKET_TIME = 0.001
-"""From a packet of the sensor board to the next [s]."""
+"""Time between two packets of the sensor board [s]."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """What a person is to do, until it is done.
+    """An instruction to a person, until it is done.
 
     Attributes:
         act: ``measure``, ``move`` a joint, ``stops`` of a joint, take a ``pose``, ``place`` or
@@ -73,14 +73,14 @@ class Discrepancy:
 
 @dataclass
 class StepReport:
-    """What a step found out."""
+    """The findings of a step."""
 
     values: dict[str, Any] = field(default_factory=dict)
     discrepancies: list[Discrepancy] = field(default_factory=list)
 
     @property
     def passed(self) -> bool:
-        """Whether the next step may follow."""
+        """True if the next step may follow."""
         return all(discrepancy.mended for discrepancy in self.discrepancies)
 
     def add(self, place: str, expected: str, found: str, fix: str, mended: bool = False) -> None:
@@ -114,15 +114,15 @@ class BringUpRun(Protocol):
 
     @property
     def success(self) -> bool:
-        """Whether the run went as its graph intends."""
+        """True if the run went as its graph intends."""
 
     @property
     def reason(self) -> str:
-        """Why it ended, or what failed."""
+        """The reason of its end or of its failure."""
 
     @property
     def metrics(self) -> Mapping[str, Any]:
-        """What the blocks say of it."""
+        """The metrics of the blocks."""
 
 
 class GraphRunner(Protocol):
@@ -133,14 +133,14 @@ class GraphRunner(Protocol):
 
 
 class Session:
-    """A robot on the bench: its file, its devices, and who stands beside it.
+    """A robot on the bench: its file, its devices, and the person beside it.
 
     Args:
         file: of the hardware.
         robot: the description.
         connect: opens the devices; their ports are closed again while a graph runs.
         operator: the person.
-        hold: gives what waits for the next cycle of the bus, and says whether to go on.
+        hold: gives a function that waits for the next cycle of the bus and returns whether to go on.
         run_graph: runs a graph on this robot.
 
     Nothing that it offers switches a drive on by itself.
@@ -189,7 +189,7 @@ class Session:
 
     @property
     def friction_file(self) -> Path:
-        """What the joints have of friction beyond the description's, as a graph's fragment."""
+        """The graph fragment with the joints' friction beyond the description's."""
         return self.file.with_suffix(".friction.yaml")
 
     @property
@@ -198,12 +198,12 @@ class Session:
         return self.robot.transmission.motors
 
     def raw_positions(self) -> Array:
-        """What every drive's encoder says now [rad], (n_motors,)."""
+        """Read every drive's encoder [rad], (n_motors,)."""
         ids = [self.hardware.motors[name].id for name in self.motors]
         return np.array([self.bus.read(k, "present_position")["present_position"] for k in ids])
 
     def joint_positions(self) -> Array:
-        """The joints' angles by the file's signs and offsets [rad], (n_joints,)."""
+        """Return the joints' angles by the file's signs and offsets [rad], (n_joints,)."""
         settings = [self.hardware.motors[name] for name in self.motors]
         sign = np.array([float(motor.sign) for motor in settings])
         zero = np.array([motor.zero for motor in settings])
@@ -257,7 +257,7 @@ class BringUpRecord:
         return entry
 
     def passed(self, step: str) -> bool:
-        """Whether this step passed the last time."""
+        """Check that this step passed the last time."""
         last = [entry for entry in self.entries if entry["step"] == step]
         return bool(last) and bool(last[-1]["passed"])
 

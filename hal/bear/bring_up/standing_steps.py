@@ -21,13 +21,13 @@ from .session import Request, Session, StepReport
 STAND, HOP = "bring_up_stand.yaml", "bring_up_hop.yaml"
 """The graphs of these steps."""
 SQUAT_DEPTH = 0.05
-"""How far the robot squats [m]."""
+"""Depth of the squat [m]."""
 HOPS = (0.02, 0.05, 0.08, 0.12)
-"""How far the centre of mass rises in each hop [m]."""
+"""Rise of the centre of mass in each hop [m]."""
 HEADROOM = 1.5
 """The share of the planned rise that the time in the air may show at most."""
 SAT_WITHIN = 0.35
-"""How far a joint may be from the end of the way down [rad]: drives in damping give way."""
+"""Largest distance of a joint from the end of the way down [rad]: drives in damping give way."""
 
 
 def stand(session: Session) -> StepReport:
@@ -70,7 +70,7 @@ def squat(session: Session) -> StepReport:
 
 
 def hop(rise: float) -> Callable[[Session], StepReport]:
-    """The step of a hop in which the centre of mass rises by so much [m]."""
+    """Return the step of a hop in which the centre of mass rises by so much [m]."""
 
     def step(session: Session) -> StepReport:
         text = f"hop by {100.0 * rise:g} cm"
@@ -87,7 +87,7 @@ def hop(rise: float) -> Callable[[Session], StepReport]:
 
 
 def _run(session: Session, graph: str, what: str, settings: Mapping[str, Any]) -> StepReport:
-    """Have the robot hung up and the motion confirmed, run the graph, and note what it says."""
+    """Have the robot hung up and the motion confirmed, run the graph, and note its outcome."""
     report = StepReport()
     session.do(
         Request(

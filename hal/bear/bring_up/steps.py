@@ -24,16 +24,16 @@ LENGTH_ERROR, MASS_ERROR = 0.004, 0.05
 SHORTEST = 0.1
 """Shorter links are not measured [m]."""
 LAST_ADDRESS = 32
-"""The last address that is asked."""
+"""The last address that is queried."""
 LEAST_MOVE = 0.1
-"""How far a joint must be moved by hand at least to show its direction [rad]."""
+"""Least motion of a joint by hand that shows its direction [rad]."""
 RATIO_ERROR = 0.25
-"""By what share the drives' motions may differ from those of the moved joint, and the part of the motion that
-counts as none."""
+"""Share by which the drives' motions may differ from those of the moved joint, and the part of the motion that counts
+as none."""
 STOP_ERROR = 0.06
-"""How far a hard stop may be from the description's limit [rad]: less than a gear's tooth."""
+"""Largest distance of a hard stop from the description's limit [rad]: less than a gear's tooth."""
 MARGIN = 0.02
-"""How far within its stops a motor stays [rad]."""
+"""Margin of a motor to its stops [rad]."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class BringUpStep:
 
 
 def check_robot(session: Session) -> StepReport:
-    """Whether this is the described robot: lengths of the legs and mass, measured by a person."""
+    """Check that this is the described robot: lengths of the legs and mass, measured by a person."""
     report = StepReport()
     robot = session.robot
     for joint in robot.joints:
@@ -72,7 +72,7 @@ def check_robot(session: Session) -> StepReport:
 
 
 def check_drives(session: Session) -> StepReport:
-    """Whether exactly the file's drives answer, healthy, off, and with a good supply."""
+    """Check that exactly the file's drives answer, healthy, off, and with a good supply."""
     report = StepReport()
     hardware = session.hardware
     answered = {
@@ -122,7 +122,7 @@ def check_drives(session: Session) -> StepReport:
 
 
 def check_directions(session: Session) -> StepReport:
-    """Which drive moves with which joint, and which way round; writes ``sign``.
+    """Find the drive that moves with each joint, and its direction; writes ``sign``.
 
     A joint moved by hand turns the drives by a column of the map from joints to motors. All
     joints together give a row for every drive, which tells the motor that it drives and its sign.
@@ -182,7 +182,7 @@ def check_directions(session: Session) -> StepReport:
 
 
 def _closest_motor(row: Array, expected: Array) -> tuple[int, int] | None:
-    """The motor and the sign whose motions with all joints are those of this drive, if any."""
+    """Return the motor and the sign whose motions with all joints are those of this drive, if any."""
     for sign in (1, -1):
         errors = np.abs(sign * expected - row).max(axis=1)
         if errors.min() < RATIO_ERROR:
@@ -249,7 +249,7 @@ def measure_limits(session: Session) -> StepReport:
 
 
 def _motor_ranges(session: Session, low: Array, high: Array) -> dict[str, dict[str, float]]:
-    """The range of every motor while its joints are within theirs."""
+    """Return the range of every motor while its joints are within theirs."""
     forward = np.maximum(session.robot.joint_to_motor, 0.0)
     backward = np.minimum(session.robot.joint_to_motor, 0.0)
     lowest, highest = forward @ low + backward @ high, forward @ high + backward @ low
@@ -280,7 +280,7 @@ STEPS = (
         "watchdog", "a drive goes on when the cable is pulled", power_steps.check_watchdogs
     ),
     BringUpStep(
-        "motors", "a motor is weaker than it says, or a joint is tight", power_steps.check_motors
+        "motors", "a motor is weaker than specified, or a joint is tight", power_steps.check_motors
     ),
     BringUpStep("gains", "a loop oscillates, or does not hold", power_steps.hold_in_the_air),
     BringUpStep("stand", "a switch stays open, or the robot falls", standing_steps.stand),

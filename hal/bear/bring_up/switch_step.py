@@ -66,7 +66,7 @@ def check_switches(session: Session) -> StepReport:
 
 
 def _closed(session: Session, count: int) -> NDArray[np.bool_] | None:
-    """The switches' bits of a packet from now on; ``None`` if none comes."""
+    """Return the switches' bits of a packet from now on; ``None`` if none comes."""
     session.board.poll()
     for _ in range(POLLS):
         if session.board.poll():

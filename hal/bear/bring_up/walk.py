@@ -17,7 +17,7 @@ class UnknownStepError(LookupError):
 def steps_from(
     record: BringUpRecord, first: str | None, last: str | None = None
 ) -> tuple[BringUpStep, ...]:
-    """The steps to do: from ``first``, or from the first that has not passed, to ``last``.
+    """Return the steps to do: from ``first``, or from the first that has not passed, to ``last``.
 
     Raises:
         UnknownStepError: there is no step of that name.

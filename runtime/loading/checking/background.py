@@ -17,7 +17,7 @@ MOST_UNDER_WAY = 1000
 
 
 def move_to_background(draft: BlockDraft, base_rate: float, problems: Problems) -> None:
-    """Let a block that the graph says to work in the background do so."""
+    """Move the block to the background, if the graph declares that it works there."""
     node, kind = draft.flat.background, draft.block_type
     if node is None or kind is None:
         return
@@ -60,7 +60,7 @@ def _check_kind(draft: BlockDraft, kind: type[Block], node: MapNode, problems: P
 def _read_latency(
     draft: BlockDraft, node: MapNode, given: Mapping[str, Any], base_rate: float, problems: Problems
 ) -> int | None:
-    """The latency in runs of the block."""
+    """Read the latency in runs of the block."""
     entry = node.get("latency")
     path = draft.flat.path
     period = draft.period_ticks / base_rate
@@ -103,7 +103,7 @@ def _read_latency(
 def _read_initial(
     draft: BlockDraft, node: MapNode, problems: Problems
 ) -> dict[str, dict[str, Any]]:
-    """The outputs before the first result."""
+    """Read the outputs before the first result."""
     entry = node.get("initial")
     found: dict[str, dict[str, Any]] = {}
     if entry is None or not isinstance(entry.value, MapNode):

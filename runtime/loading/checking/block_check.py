@@ -40,7 +40,7 @@ class BlockDraft:
     period_ticks: int = 1
     offset_ticks: int = 0
     stands_for: str = ""
-    """For a block that loading has inserted: the input whose wire it puts together."""
+    """Input whose wire a block puts together, where loading has inserted the block."""
 
     @property
     def inputs(self) -> Mapping[str, Input[Any]]:
@@ -53,14 +53,14 @@ class BlockDraft:
         return self.block_type.outputs if self.block_type else {}
 
     def shape(self, item: Field) -> tuple[int, ...] | None:
-        """A field's shape in numbers, where it is known."""
+        """Return a field's shape in numbers, where it is known."""
         try:
             return item.resolve(self.dimensions)
         except KeyError:
             return None
 
     def quantity(self, port: str, field_name: str) -> Quantity:
-        """Unit and frame of an output's field; not checked where they are not known."""
+        """Return unit and frame of an output's field; not checked where they are not known."""
         known = self.quantities.get(f"{port}.{field_name}")
         if known is None:
             known = quantity_of(self.outputs[port].signal.fields[field_name])
@@ -117,7 +117,7 @@ def check_defaults(draft: BlockDraft, problems: Problems) -> None:
 
 
 def lacks_robot(draft: BlockDraft, settings: Settings) -> bool:
-    """Whether the block needs something of a robot that the graph's robot does not have."""
+    """Return whether the block needs a property that the graph's robot does not have."""
     assert draft.block_type is not None
     return bool(unmet_needs(draft.block_type, settings.robot))
 
@@ -167,7 +167,7 @@ def report_requirement(
 
 
 def _inside(node: Node, step: str) -> Node | None:
-    """The value under a key, or the element at an index."""
+    """Return the value under a key, or the element at an index."""
     if isinstance(node, MapNode):
         entry = node.get(step)
         return entry.value if entry else None
@@ -215,8 +215,8 @@ def check_sizes(graph: FlatGraph, drafts: Mapping[str, BlockDraft], problems: Pr
 
 
 def _arrays(draft: BlockDraft, drafts: Mapping[str, BlockDraft]) -> Iterator[_Array]:
-    """The arrays that a block needs: its outputs, its states whose shapes are known before it is
-    set up, constants for its unwired inputs, and the buffers of delayed wires."""
+    """Yield the arrays that a block needs: its outputs, its states whose shapes are known before it
+    is set up, constants for its unwired inputs, and the buffers of delayed wires."""
     states = draft.block_type.states if draft.block_type is not None else {}
     for ports in (draft.outputs, states):
         for name, port in ports.items():
@@ -272,7 +272,7 @@ def _report(
 
 
 def readable(size: int) -> str:
-    """A number of bytes in the largest unit that leaves at least 1: ``1.5 GB``."""
+    """Format a number of bytes in the largest unit that leaves at least 1: ``1.5 GB``."""
     units = ("B", "kB", "MB", "GB", "TB")
     power = min((len(str(size)) - 1) // 3, len(units) - 1)
     return f"{size / 1000**power:.3g} {units[power]}"

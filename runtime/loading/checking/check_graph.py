@@ -23,13 +23,13 @@ from ..flattening.rates import check_hyperperiod, read_offset, read_period
 from .background import move_to_background
 from .block_check import BlockDraft, check_defaults, check_emit, check_fit, check_sizes, lacks_robot
 from .composite_wires import resolve_composite_wires
-from .faults import insert_faults
 from .infer_units import infer_quantities, inferred_quantities, unchecked_wires
 from .inserted import insert_constant, insert_delay, read_values
 from .link_settings import check_paths, check_watchdog, read_link_settings
 from .parameter_references import resolve_references
 from .parameters import check_parameters
 from .settings import Settings, read_settings
+from .signal_errors import insert_signal_errors
 from .wire_check import WireCheck
 
 LONGEST_RING = 8
@@ -48,7 +48,7 @@ def check_graph(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     if settings.base_rate is not None and graph.rate is not None:
         periods = (draft.period_ticks for draft in drafts.values())
         check_hyperperiod(periods, graph.rate.key_where, problems)
-    drafts = insert_faults(graph, drafts, settings, problems)
+    drafts = insert_signal_errors(graph, drafts, settings, problems)
     drafts = resolve_composite_wires(graph, drafts, settings.robot, problems)
     wires = WireCheck(graph, drafts, problems)
     values: dict[str, Any] = {}
@@ -79,7 +79,8 @@ def _draft(
     classes: dict[tuple[str, Path], type[Block]],
     problems: Problems,
 ) -> BlockDraft:
-    """The block with its class and parameters; ``classes`` holds those found for earlier blocks."""
+    """Make the draft of a block with its class and parameters; ``classes`` holds those found for
+    earlier blocks."""
     draft = BlockDraft(flat)
     if settings.base_rate is not None:
         draft.period_ticks = read_period(flat, settings.base_rate, problems)
@@ -130,7 +131,7 @@ def _draft(
 
 
 def _find(flat: FlatBlock, graph: FlatGraph, problems: Problems) -> type[Block] | None:
-    """The block's class, seen from its own file, then from the graph's."""
+    """Find the block's class, as seen from its own file, then from the graph's."""
     folders = dict.fromkeys([flat.folder, graph.folder])
     unknown: UnknownBlockError | None = None
     for folder in folders:
@@ -153,7 +154,7 @@ def _find(flat: FlatBlock, graph: FlatGraph, problems: Problems) -> type[Block] 
         str(unknown),
         flat.use_where,
         at=flat.path,
-        expected=_places_of_modules(flat, graph)
+        expected=_folders_of_modules(flat, graph)
         if isinstance(unknown, UnknownModuleError)
         else "a block of `aloft blocks`, module:Class, or a file.yaml",
         found=flat.use,
@@ -163,8 +164,8 @@ def _find(flat: FlatBlock, graph: FlatGraph, problems: Problems) -> type[Block] 
     return None
 
 
-def _places_of_modules(flat: FlatBlock, graph: FlatGraph) -> str:
-    """Where the module of a ``module:Class`` may lie."""
+def _folders_of_modules(flat: FlatBlock, graph: FlatGraph) -> str:
+    """Return the places where the module of a ``module:Class`` may lie."""
     file = f"{flat.use.partition(':')[0].replace('.', '/')}.py"
     folders = dict.fromkeys(str(folder) for folder in (flat.folder, graph.folder, Path()))
     shown = " or ".join("the current folder" if f == "." else f for f in folders)
@@ -172,7 +173,7 @@ def _places_of_modules(flat: FlatBlock, graph: FlatGraph) -> str:
 
 
 def _check_dimensions(draft: BlockDraft, settings: Settings, problems: Problems) -> bool:
-    """Whether every named dimension of the block's ports is known and at least 1.
+    """Return whether every named dimension of the block's ports is known and at least 1.
 
     A dimension of the robot may be zero: one without feet has empty arrays for its contacts.
     """
@@ -239,7 +240,7 @@ def _read_values(
 
 
 def _machines(drafts: Mapping[str, BlockDraft]) -> list[ScheduleBlock]:
-    """The blocks as the schedule needs them; wires whose ends do not exist are left out."""
+    """Return the blocks as the schedule needs them; wires whose ends do not exist are left out."""
     outputs = {f"{path}.{name}" for path, draft in drafts.items() for name in draft.outputs}
     return [
         ScheduleBlock(
@@ -283,7 +284,7 @@ def _report_loops(drafts: Mapping[str, BlockDraft], problems: Problems) -> None:
 
 
 def _ring(names: Sequence[str]) -> str:
-    """The names in order; of a long ring the first and the last, and how many are between."""
+    """Return the names in order; of a long ring the first and the last, and the number between."""
     most = LONGEST_RING
     if len(names) > 2 * most:
         names = [*names[:most], f"({len(names) - 2 * most} more)", *names[-most:]]

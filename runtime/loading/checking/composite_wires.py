@@ -24,12 +24,12 @@ from ..flattening.flat import (
     FlatGraph,
     FlatWire,
     WireElement,
-    WirePart,
-    plain_part,
+    WireSlice,
+    plain_slice,
 )
 from ..reading.selection import Selection, runs, select
 from .block_check import BlockDraft
-from .inserted import GatherPiece, gather_block_type, part_signal, read_values
+from .inserted import GatherPiece, gather_block_type, read_values, selected_signal
 from .wire_check import WireCheck
 
 
@@ -39,7 +39,7 @@ def resolve_composite_wires(
     robot: RobotDescription | None,
     problems: Problems,
 ) -> dict[str, BlockDraft]:
-    """The drafts with an inserted block in front of every input that is put together."""
+    """Return the drafts with an inserted block in front of every input that is put together."""
     found: dict[str, BlockDraft] = {}
     check = WireCheck(graph, drafts, problems)
     names = robot.element_names if robot is not None else {}
@@ -48,7 +48,7 @@ def resolve_composite_wires(
         excused = list(draft.flat.excused)
         for name, wire in draft.flat.wires.items():
             port = draft.inputs.get(name)
-            if not wire.parts or port is None:
+            if not wire.slices or port is None:
                 continue
             composer = _WireComposer(draft, name, wire, drafts, check, names, problems)
             made = composer.compose()
@@ -88,37 +88,37 @@ class _WireComposer:
         self.wire_text = wire_text(replace(self.wire, delay=0, truth=False).plain())
 
     def compose(self) -> BlockDraft | FlatWire | None:
-        """The inserted block, or a constant, or ``None`` after a problem."""
-        parts = self._by_field()
-        if parts is None:
+        """Return the inserted block, or a constant, or ``None`` after a problem."""
+        slices = self._by_field()
+        if slices is None:
             return None
-        items = [item for part in parts.values() for item in part.items]
+        items = [item for wire_slice in slices.values() for item in wire_slice.items]
         if all(item.literal is not None for item in items) and not any(
-            part.is_list for part in parts.values()
+            wire_slice.is_list for wire_slice in slices.values()
         ):
-            return self._constant(parts)
+            return self._constant(slices)
         before = len(self.problems)
-        for name, part in parts.items():
-            self._part(name, part)
-        if len(self.problems) > before or len(self.fields) < len(parts):
+        for name, wire_slice in slices.items():
+            self._gather(name, wire_slice)
+        if len(self.problems) > before or len(self.fields) < len(slices):
             return None
         return self._draft()
 
-    def _by_field(self) -> dict[str, WirePart[WireElement]] | None:
-        """The parts by the reader's fields."""
+    def _by_field(self) -> dict[str, WireSlice[WireElement]] | None:
+        """Return the parts by the reader's fields."""
         fields = self.signal.fields
-        found: dict[str, WirePart[WireElement]] = {}
-        for part in self.wire.parts:
-            name = part.field
+        found: dict[str, WireSlice[WireElement]] = {}
+        for wire_slice in self.wire.slices:
+            name = wire_slice.field
             if not name:
                 if len(fields) > 1:
                     example = ", ".join(f"{f}: ..." for f in list(fields)[:2])
                     self._report(
                         f"{self.at} has several fields, and one source is given for it",
-                        part.where,
+                        wire_slice.where,
                         expected=f"{{{example}}}, with a source for each of {listing(fields)}",
-                        found=text_of(plain_part(part)),
-                        fix=f"{self.name}: {{{next(iter(fields))}: {text_of(plain_part(part))}, ...}}",
+                        found=text_of(plain_slice(wire_slice)),
+                        fix=f"{self.name}: {{{next(iter(fields))}: {text_of(plain_slice(wire_slice))}, ...}}",
                     )
                     return None
                 name = next(iter(fields))
@@ -126,14 +126,14 @@ class _WireComposer:
                 similar = nearest(name, fields)
                 self._report(
                     f"{self.signal.__name__} has no field {name!r}",
-                    part.where,
+                    wire_slice.where,
                     expected=listing(fields),
                     found=name,
                     nearest=similar,
-                    fix=f"{similar[0]}: {text_of(plain_part(part))}" if similar else "",
+                    fix=f"{similar[0]}: {text_of(plain_slice(wire_slice))}" if similar else "",
                 )
                 return None
-            found[name] = part
+            found[name] = wire_slice
         missing = [name for name in fields if name not in found]
         if missing:
             self._report(
@@ -146,26 +146,26 @@ class _WireComposer:
             return None
         return found
 
-    def _constant(self, parts: Mapping[str, WirePart[WireElement]]) -> FlatWire | None:
-        """The wire of numbers alone."""
+    def _constant(self, slices: Mapping[str, WireSlice[WireElement]]) -> FlatWire | None:
+        """Return the wire of numbers alone."""
         if self.wire.delay:
             self._report(
                 f"the wire to {self.at} delays a constant", self.wire.where, fix="remove 'delay'"
             )
             return None
         entries = tuple(
-            Entry(name, part.where, part.items[0].literal)  # type: ignore[arg-type]  # a constant
-            for name, part in parts.items()
+            Entry(name, wire_slice.where, wire_slice.items[0].literal)  # type: ignore[arg-type]  # a constant
+            for name, wire_slice in slices.items()
         )
         return FlatWire("", self.wire.where, constant=MapNode(entries, self.wire.where))
 
-    def _part(self, name: str, part: WirePart[WireElement]) -> None:
+    def _gather(self, name: str, wire_slice: WireSlice[WireElement]) -> None:
         """Add the pieces of one of the reader's fields."""
         field = self.signal.fields[name]
         shape: tuple[int, ...] = ()
         start = 0
         types: dict[str, WireElement] = {}
-        for item in part.items:
+        for item in wire_slice.items:
             if item.literal is not None:
                 values = self._numbers(name, field, item)
                 if values is None:
@@ -186,13 +186,17 @@ class _WireComposer:
             (first, a), (second, b) = list(types.items())[:2]
             self._report(
                 f"{wire_text(a.plain())} is {first} and {wire_text(b.plain())} is {second}",
-                part.where,
+                wire_slice.where,
                 expected=field.dtype_name,
                 found=listing(types),
             )
             return
         wanted = self.reader.shape(field)
-        if part.is_list or (shape == () and wanted == (1,)) or (shape == (1,) and wanted == ()):
+        if (
+            wire_slice.is_list
+            or (shape == () and wanted == (1,))
+            or (shape == (1,) and wanted == ())
+        ):
             shape = wanted if wanted == () and start == 1 else (start,)
         self.fields[name] = (shape, next(iter(types), field.dtype_name))
 
@@ -209,7 +213,8 @@ class _WireComposer:
         return tuple(np.atleast_1d(np.asarray(values[name], np.float64)).tolist())
 
     def _source(self, item: WireElement) -> tuple[str, Field, NDArray[np.int64]] | None:
-        """The inserted block's input for a source, the field, and the places selected in it."""
+        """Return the inserted block's input for a source, the field, and the places selected in
+        it."""
         assert item.wire is not None
         wire = replace(item.wire, where=item.where, shown=wire_text(item.plain()))
         ends = self.check.source(self.at, wire, self.reader, None)
@@ -240,7 +245,7 @@ class _WireComposer:
             )
             return None
         port = f"u{len(self.inputs)}"
-        self.inputs[port] = part_signal("Selected", {name: (shape, field.dtype_name)})
+        self.inputs[port] = selected_signal("Selected", {name: (shape, field.dtype_name)})
         self.wires[port] = wire
         return port, field, places
 
@@ -265,7 +270,8 @@ class _WireComposer:
         )
 
     def _draft(self) -> BlockDraft | None:
-        """The inserted block: in the ticks of its reader, or of its sources where it is delayed."""
+        """Return the inserted block: in the ticks of its reader, or of its sources where it is
+        delayed."""
         reader = self.reader
         clock = (reader.period_ticks, reader.offset_ticks)
         if self.wire.delay:
@@ -296,7 +302,7 @@ class _WireComposer:
         block_type = gather_block_type(
             tuple(self.pieces),
             self.inputs,
-            part_signal(self.signal.__name__, self.fields),
+            selected_signal(self.signal.__name__, self.fields),
             {
                 name: q if q is not None and q.unit is not None else None
                 for name, q in wanted.items()
@@ -313,11 +319,11 @@ class _WireComposer:
 
 
 def wire_text(plain: object) -> str:
-    """What a graph says, in one line; the text of one source without the quotes of YAML."""
+    """Format a wire in one line; the text of one source without the quotes of YAML."""
     return plain if isinstance(plain, str) else text_of(plain)
 
 
 def _of_one(field: Field) -> Field:
-    """A field like this one for a single number."""
+    """Return a field like this one for a single number."""
     unit = None if field.unit is None else field.unit.text
     return Field((), unit=unit, dtype=field.dtype_name, inferred=field.inferred)

@@ -13,16 +13,16 @@ from .block_check import BlockDraft
 from .inserted import own_unit
 
 Answers = Mapping[str, Quantity | None]
-"""What a block says about its inferred outputs, by ``port.field``; ``None`` while it cannot."""
+"""Quantities of a block's inferred outputs, by ``port.field``; ``None`` while one is not known."""
 
 
 def infer_quantities(drafts: Mapping[str, BlockDraft], problems: Problems) -> None:
     """Fill in the quantities of all drafts, and report inputs that do not go together.
 
-    A block is asked when all its wired inputs are known. Where blocks wait for each other in a
-    ring, the first that can answer with what is known does; where none can, the first output that
-    is missing is taken for a plain number. A block that answered before all its inputs were known
-    is asked again at the end, so that a ring whose quantities contradict each other is found.
+    A block infers its outputs when all its wired inputs are known. Where blocks wait for each other
+    in a ring, the first that can answer with what is known does; where none can, the first output
+    that is missing is taken for a plain number. A block that answered before all its inputs were
+    known answers again at the end, so that a ring whose quantities contradict each other is found.
     """
     inference = _QuantityInference(drafts)
     inference.run()
@@ -48,7 +48,7 @@ class _QuantityInference:
         self.unanswered: dict[str, None] = {}
         """Blocks that had no answer to what has arrived so far."""
         self.final: dict[str, tuple[InputQuantities, Answers]] = {}
-        """What blocks answered when all their inputs were known, which no longer changes."""
+        """Answers of blocks with all their inputs known, which no longer change."""
 
     def run(self) -> None:
         """Ask all blocks until every output is known."""
@@ -78,12 +78,13 @@ class _QuantityInference:
                 queue.extend([path, *self.readers.get(path, ())])
 
     def ask(self, draft: BlockDraft) -> tuple[InputQuantities, Answers]:
-        """The quantities at a block's inputs, and what it says about its outputs."""
+        """Return the quantities at a block's inputs, and its answers for its outputs."""
         inputs = self._given(draft)
         return inputs, inferred_outputs(draft, inputs)
 
     def _ask(self, path: str, *, complete: bool = False) -> bool:
-        """Whether the block could say any further quantity; ``complete`` if all inputs are known."""
+        """Infer the block's outputs and return whether a quantity is new; ``complete`` if all
+        inputs are known."""
         draft = self.drafts[path]
         inputs, answers = self.ask(draft)
         if complete:
@@ -105,14 +106,14 @@ class _QuantityInference:
             self.unanswered.pop(reader, None)
 
     def _missing(self, draft: BlockDraft) -> Iterator[str]:
-        """The output fields that are not known yet."""
+        """Yield the output fields that are not known yet."""
         for name, output in draft.outputs.items():
             for field_name in output.signal.fields:
                 if f"{name}.{field_name}" not in draft.quantities:
                     yield f"{name}.{field_name}"
 
     def _complete(self, draft: BlockDraft) -> bool:
-        """Whether the quantities of all wired inputs are known."""
+        """Return whether the quantities of all wired inputs are known."""
         for name, wire in draft.flat.wires.items():
             port = draft.inputs.get(name)
             source = self.drafts.get(wire.source_block)
@@ -128,7 +129,7 @@ class _QuantityInference:
         return True
 
     def _given(self, draft: BlockDraft) -> InputQuantities:
-        """The quantities at a block's inputs."""
+        """Return the quantities at a block's inputs."""
         found = {}
         for name, port in draft.inputs.items():
             for field_name in port.signal.fields:
@@ -141,7 +142,8 @@ class _QuantityInference:
 def quantity_at_input(
     drafts: Mapping[str, BlockDraft], draft: BlockDraft, name: str, field_name: str
 ) -> Quantity | None:
-    """What arrives at an input's field; ``None`` where nothing is wired, or it is not known yet."""
+    """Return the quantity that arrives at an input's field; ``None`` where nothing is wired, or it
+    is not known yet."""
     wire = draft.flat.wires.get(name)
     if wire is None:
         return None
@@ -152,7 +154,8 @@ def quantity_at_input(
 
 
 def constant_quantity(draft: BlockDraft, name: str, field_name: str) -> Quantity:
-    """The quantity of a constant: that of the input's field; a plain number if it takes any."""
+    """Return the quantity of a constant: that of the input's field; a plain number if it takes
+    any."""
     field = draft.inputs[name].signal.fields[field_name]
     declared = quantity_of(field)
     node = draft.flat.wires[name].constant
@@ -163,7 +166,7 @@ def constant_quantity(draft: BlockDraft, name: str, field_name: str) -> Quantity
 
 
 def inferred_quantities(draft: BlockDraft, drafts: Mapping[str, BlockDraft]) -> dict[str, Quantity]:
-    """What a block's inferred fields are in this graph, by ``port.field``."""
+    """Return the quantities of a block's inferred fields in this graph, by ``port.field``."""
     found = {}
     for name, output in draft.outputs.items():
         for field_name, field in output.signal.fields.items():
@@ -178,7 +181,7 @@ def inferred_quantities(draft: BlockDraft, drafts: Mapping[str, BlockDraft]) -> 
 
 
 def unchecked_wires(drafts: Mapping[str, BlockDraft]) -> Iterator[str]:
-    """A text for every wire whose reader has a unit and whose source does not say its own."""
+    """Yield a text for every wire whose reader has a unit and whose source has none of its own."""
     for path, draft in drafts.items():
         for name, wire in draft.flat.wires.items():
             if wire.constant is not None or name not in draft.inputs or draft.stands_for:
@@ -193,7 +196,7 @@ def unchecked_wires(drafts: Mapping[str, BlockDraft]) -> Iterator[str]:
 
 
 def inferred_outputs(draft: BlockDraft, inputs: InputQuantities) -> Answers:
-    """What the block says about its inferred outputs; they are not checked where it fails."""
+    """Return the block's answers for its inferred outputs; they are not checked where it fails."""
     block_type = draft.block_type
     inferred = [
         (name, field_name)
@@ -221,7 +224,8 @@ def inferred_outputs(draft: BlockDraft, inputs: InputQuantities) -> Answers:
 def _check(
     draft: BlockDraft, inputs: InputQuantities, answers: Answers, problems: Problems
 ) -> None:
-    """Report where a block's inputs disagree, or an output contradicts what a ring said before."""
+    """Report inputs of a block that disagree, or an output that contradicts what a ring assumed
+    before."""
     flat = draft.flat
     for item in inputs.disagreements:
         name = item.port.partition(".")[0]
@@ -267,7 +271,7 @@ def _units_differ(a: Quantity, b: Quantity) -> bool:
 
 
 def _named(quantity: Quantity) -> str:
-    """The quantity in words that also name a plain number."""
+    """Describe the quantity in words that also name a plain number."""
     if quantity.unit is not None and str(quantity.unit) == "1":
         return f"plain numbers in {quantity.frame}" if quantity.frame else "plain numbers"
     return str(quantity)

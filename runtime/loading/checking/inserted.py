@@ -53,17 +53,17 @@ class Gather(Block):
     Params = Parameters
     pieces: ClassVar[tuple[GatherPiece, ...]] = ()
     wanted: ClassVar[Mapping[str, Quantity | None]] = {}
-    """What the reader's fields are; ``None`` for one that takes any."""
+    """Quantities of the reader's fields; ``None`` for one that takes any."""
 
     wire_text: ClassVar[str] = ""
     """The wire as the graph has it."""
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """What the parts of a field have in common.
+        """Infer the common quantity of the parts of a field.
 
-        They must be what the reader says. If it takes any and they differ, the unit of the whole is
-        not checked.
+        They must have the quantity of the reader. If it takes any and they differ, the unit of the
+        whole is not checked.
         """
         return {f"y.{name}": cls._quantity(name, inputs) for name in cls.wanted}
 
@@ -112,12 +112,12 @@ def gather_block_type(
     wire_text: str,
     reads_truth: bool,
 ) -> type[Gather]:
-    """The block type that makes the signal ``output`` of these pieces.
+    """Return the block type that makes the signal ``output`` of these pieces.
 
     ``wire_text`` is the wire as the graph has it, and ``reads_truth`` whether its reader may do that.
     """
     ports: dict[str, Any] = {
-        name: Input(signal, text="what is selected from", reads_truth=reads_truth)
+        name: Input(signal, text="the vector to select from", reads_truth=reads_truth)
         for name, signal in inputs.items()
     }
     body = {
@@ -131,8 +131,8 @@ def gather_block_type(
     return type("Gather", (Gather,), body)
 
 
-def part_signal(name: str, fields: Mapping[str, tuple[tuple[int, ...], str]]) -> type[Signal]:
-    """A signal whose fields have these shapes and types, and carry their units."""
+def selected_signal(name: str, fields: Mapping[str, tuple[tuple[int, ...], str]]) -> type[Signal]:
+    """Return a signal whose fields have these shapes and types, and carry their units."""
     body: dict[str, Any] = {
         field: Field(shape, dtype=dtype, inferred=True, text="what was selected")
         for field, (shape, dtype) in fields.items()
@@ -168,7 +168,7 @@ class ConstantSignal(Block):
 
 @lru_cache(maxsize=256)
 def constant_block_type(signal: type[Signal]) -> type[ConstantSignal]:
-    """The block type that holds a constant ``signal`` in its output ``y``."""
+    """Return the block type that holds a constant ``signal`` in its output ``y``."""
     text = "the values"
     body = {"__doc__": ConstantSignal.__doc__, "y": Output(signal, text=text)}
     return type(f"Constant{signal.__name__}", (ConstantSignal,), body)
@@ -177,7 +177,7 @@ def constant_block_type(signal: type[Signal]) -> type[ConstantSignal]:
 def insert_delay(
     reader: BlockDraft, name: str, wire: FlatWire, source: BlockDraft, values: Any
 ) -> BlockSpec:
-    """The block that delays a wire; it runs in the same ticks as the wire's source."""
+    """Return the block that delays a wire; it runs in the same ticks as the wire's source."""
     signal = source.outputs[wire.source_port].signal
     return BlockSpec(
         path=f"{reader.flat.path}/{name}~delay",
@@ -192,7 +192,7 @@ def insert_delay(
 
 
 def insert_constant(reader: BlockDraft, name: str, wire: FlatWire, values: Any) -> BlockSpec:
-    """The block that writes a constant which stands in place of a source."""
+    """Return the block that writes a constant which stands in place of a source."""
     signal: type[Any] = reader.inputs[name].signal
     return BlockSpec(
         path=f"{reader.flat.path}/{name}~constant",
@@ -242,7 +242,8 @@ def read_values(
 
 
 def own_unit(node: Node) -> Unit | None:
-    """The unit of a constant for an input that takes any: that of its first number with a unit.
+    """Return the unit of a constant for an input that takes any: that of its first number with a
+    unit.
 
     Numbers without a unit are plain; zeros alone have a unit that is not checked, because zero
     means the same in all of them.
@@ -262,7 +263,7 @@ def own_unit(node: Node) -> Unit | None:
 
 
 def _array(node: Node, field: Field, owner: BlockDraft) -> tuple[Any, str]:
-    """The value and an empty text, or ``None`` and a text that says what was expected."""
+    """Read the value, with an empty text; or return ``None`` with a text of what was expected."""
     shape = owner.shape(field)
     unit = f" in {field.unit}" if field.unit is not None and str(field.unit) != "1" else ""
     types: tuple[type, ...]

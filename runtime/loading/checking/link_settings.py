@@ -14,7 +14,7 @@ from ..reading.graph_file import LinkKeys, Links, keys_of, read_section
 
 
 def read_link_settings(graph: FlatGraph, clock: str, problems: Problems) -> LinkSettings:
-    """The settings of links; what is wrong is reported to ``problems``.
+    """Read the settings of links; what is wrong is reported to ``problems``.
 
     Args:
         graph: the graph.
@@ -116,7 +116,7 @@ def check_paths(checked: CheckedGraph, graph: FlatGraph, problems: Problems) -> 
 
 
 def _entries(links: MapNode, key: str) -> Iterable[Entry]:
-    """The entries of a mapping inside ``links``."""
+    """Return the entries of a mapping inside ``links``."""
     entry = links.get(key)
     return entry.value if entry is not None and isinstance(entry.value, MapNode) else ()
 

@@ -25,7 +25,7 @@ KEY = "from"
 
 
 def resolve_references(graph: FlatGraph, settings: Settings, problems: Problems) -> FlatGraph:
-    """The graph with every reference to what another block tells replaced by the value.
+    """Return the graph with every reference to a value of another block replaced by the value.
 
     A reference that leads nowhere is reported. One to a block with problems of its own is left
     out without a word, because those problems are reported where they are.
@@ -36,7 +36,7 @@ def resolve_references(graph: FlatGraph, settings: Settings, problems: Problems)
 
 
 def _references(block: FlatBlock) -> Iterator[tuple[tuple[str, ...], ScalarNode]]:
-    """The parameters of a block, and in its groups, that are ``{from: text}``: the path and the text of each."""
+    """Yield the parameters of a block, and in its groups, that are ``{from: text}``: the path and the text of each."""
     return _references_in(block.parameters, ())
 
 
@@ -55,7 +55,7 @@ def _references_in(
 
 
 def _with_value(node: MapNode, path: tuple[str, ...], value: Node | None) -> MapNode:
-    """The mapping with another value at a path; without the key where the value is ``None``."""
+    """Return the mapping with another value at a path; without the key where the value is ``None``."""
     entries = []
     for entry in node:
         if entry.key != path[0]:
@@ -69,7 +69,7 @@ def _with_value(node: MapNode, path: tuple[str, ...], value: Node | None) -> Map
 
 
 class _ReferenceResolver:
-    """One graph, whose blocks are asked for what they tell, each of them once."""
+    """Replaces the references of one graph; computes the exported values of each block once."""
 
     def __init__(self, graph: FlatGraph, settings: Settings, problems: Problems) -> None:
         self.graph, self.settings, self.problems = graph, settings, problems
@@ -82,7 +82,7 @@ class _ReferenceResolver:
         return replace(self.graph, blocks=blocks)
 
     def block(self, path: str, waiting_blocks: tuple[str, ...]) -> FlatBlock:
-        """A block without references; ``waiting_blocks`` are the blocks that wait for it."""
+        """Return a block without references; ``waiting_blocks`` are the blocks that wait for it."""
         if path in self.done:
             return self.done[path]
         block = self.blocks[path]
@@ -98,7 +98,7 @@ class _ReferenceResolver:
         self, reader: FlatBlock, block_type: type[Block] | None, parameter: str,
         source: ScalarNode, waiting_blocks: tuple[str, ...],
     ) -> Node | None:  # fmt: skip
-        """What stands in place of a reference; ``None`` where that is not known."""
+        """Return the value that replaces a reference; ``None`` where it is not known."""
         at = f"{reader.path}.{parameter}"
         name, _, what = str(source.value).rpartition(".")
         folder = reader.path.rpartition("/")[0]
@@ -158,7 +158,8 @@ class _ReferenceResolver:
     def tells(
         self, path: str, waiting_blocks: tuple[str, ...]
     ) -> Mapping[str, tuple[Any, str]] | None:
-        """What a block tells and its parameters, with units; ``None`` if it has a problem."""
+        """Return the exported values of a block and its parameters, with units; ``None`` if it has
+        a problem."""
         if path not in self.exported:
             self.exported[path] = self._ask(self.block(path, waiting_blocks))
         return self.exported[path]
@@ -194,7 +195,7 @@ class _ReferenceResolver:
         return {**_own_values(params), **{name: (value, "") for name, value in exported.items()}}
 
     def type_of(self, block: FlatBlock) -> type[Block] | None:
-        """The class of a block; ``None`` if it has none, which is reported elsewhere."""
+        """Return the class of a block; ``None`` if it has none, which is reported elsewhere."""
         for folder in dict.fromkeys([block.folder, self.graph.folder]):
             try:
                 return find_block(block.use, folder) if block.use else None
@@ -225,6 +226,6 @@ class _ReferenceResolver:
 
 
 def _own_values(params: Parameters) -> dict[str, tuple[Any, str]]:
-    """The parameters of a block as plain data, with their units."""
+    """Return the parameters of a block as plain data, with their units."""
     data = plain_parameters(params)
     return {k: (data[k], unit_of(info)) for k, info in type(params).model_fields.items()}

@@ -41,7 +41,7 @@ def check_parameters(
     problems: Problems,
     robot: RobotDescription | None = None,
 ) -> Parameters | None:
-    """The block's parameters; ``None`` after a problem.
+    """Check and return the block's parameters; ``None`` after a problem.
 
     Fixes of gains by joint use the joint names of ``robot``.
     """
@@ -165,7 +165,7 @@ def _report(
 
 
 def _by_name(node: Node, robot: RobotDescription | None) -> str:
-    """The fix for a list of values by position: a mapping with joint names."""
+    """Return the fix for a list of values by position: a mapping with joint names."""
     values = plain(node)
     named = by_name(values, robot) if robot is not None and isinstance(values, list) else {}
     if named:
@@ -175,7 +175,7 @@ def _by_name(node: Node, robot: RobotDescription | None) -> str:
 
 
 def _declaration(model: type[Parameters], location: Sequence[str | int]) -> FieldInfo | None:
-    """The declaration of the parameter at a location, which may be in a group."""
+    """Return the declaration of the parameter at a location, which may be in a group."""
     info = None
     for name in location:
         info = model.model_fields.get(str(name), info)
@@ -187,7 +187,7 @@ def _declaration(model: type[Parameters], location: Sequence[str | int]) -> Fiel
 
 
 def _with_text(expected: str, info: FieldInfo | None) -> str:
-    """What is expected, with the parameter's unit and its line of text."""
+    """Return the expectation, with the parameter's unit and its line of text."""
     expected = with_unit(expected, unit_of(info))
     return f"{expected} ({info.description})" if info and info.description else expected
 
@@ -264,7 +264,7 @@ def adjust(blocks: Mapping[str, Block], settings: Overrides) -> Adjustment:
 
 
 def _may_be_set(override: Override, blocks: Mapping[str, Block], problems: Problems) -> bool:
-    """Whether there is such a parameter, and it is live."""
+    """Return whether there is such a parameter, and it is live."""
     known = [path for path in blocks if "~" not in path]
     if override.block not in known:
         near = nearest(override.block, known)
@@ -304,7 +304,7 @@ def _flat(path: str, block: Block, parameters: MapNode) -> FlatBlock:
 
 
 def _fits(path: str, block: Block, params: Parameters, where: Position, problems: Problems) -> bool:
-    """Whether the block still fits its robot, and all its ports keep their sizes.
+    """Return whether the block still fits its robot, and all its ports keep their sizes.
 
     A port of another size would need another layout of the graph's memory.
     """
@@ -336,7 +336,7 @@ def _shape(field: Field, sizes: Mapping[str, int]) -> tuple[int | None, ...]:
 
 
 def _at(values: Any, override: Override) -> Any:
-    """The value at an override's path."""
+    """Return the value at an override's path."""
     for step in override.path:
         values = values.get(step) if isinstance(values, dict) else None
     return values

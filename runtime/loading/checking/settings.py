@@ -35,7 +35,7 @@ class Settings:
     dimensions: Mapping[str, int] = field(default_factory=dict)
     clock: ClockSpec = field(default_factory=ClockSpec)
     folder: Path = Path()
-    """Where the graph's file lies."""
+    """Folder of the graph's file."""
 
 
 def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
@@ -109,7 +109,7 @@ def _read_clock(graph: FlatGraph, problems: Problems) -> ClockSpec:
 
 
 def read_robot(graph: FlatGraph, problems: Problems) -> RobotDescription | None:
-    """The robot that the graph names, with the named actuator profile in use.
+    """Read the robot that the graph names, with the named actuator profile in use.
 
     Returns ``None`` where the graph names no robot, and where the robot itself has a problem. Every
     fault of the robot's description is reported.
@@ -135,7 +135,7 @@ def _find(entry: Entry, graph: FlatGraph, problems: Problems) -> RobotDescriptio
         except LookupError as error:
             message = str(error)
         except RobotError as error:
-            _report_faults(error, node.where, problems)
+            _report_description_errors(error, node.where, problems)
             return None
         except Exception as error:  # noqa: BLE001  such as a name that no file can have
             reason = " ".join(str(error).split())
@@ -156,26 +156,30 @@ def _find(entry: Entry, graph: FlatGraph, problems: Problems) -> RobotDescriptio
     return None
 
 
-def _report_faults(error: RobotError, where: Position, problems: Problems) -> None:
-    """Report every fault of a robot's description at its place in the robot's file."""
-    for fault in error.faults:
+def _report_description_errors(error: RobotError, where: Position, problems: Problems) -> None:
+    """Report every error of a robot's description at its place in the robot's file."""
+    for description_error in error.errors:
         problems.add(
             Code.ROBOT,
-            fault.message,
-            Position(fault.file or error.file, fault.line, fault.column),
-            at=".".join(map(str, fault.path)),
+            description_error.message,
+            Position(
+                description_error.file or error.file,
+                description_error.line,
+                description_error.column,
+            ),
+            at=".".join(map(str, description_error.path)),
             other="robot",
             other_where=where,
-            expected=fault.expected,
-            found=fault.found,
-            fix=fault.fix,
+            expected=description_error.expected,
+            found=description_error.found,
+            fix=description_error.fix,
         )
 
 
 def _with_actuators(
     robot: RobotDescription | None, entry: Entry, problems: Problems
 ) -> RobotDescription | None:
-    """The robot with the actuator profile that the graph names in use."""
+    """Return the robot with the actuator profile that the graph names in use."""
     node = entry.value
     name = node.value if isinstance(node, ScalarNode) else None
     if robot is None:

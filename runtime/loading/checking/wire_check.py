@@ -157,7 +157,7 @@ class WireCheck:
     def source(
         self, at: str, wire: FlatWire, target: BlockDraft | None, port: Input[Any] | None
     ) -> tuple[BlockDraft, Output[Any]] | None:
-        """The block and the output that a wire comes from; ``None`` after a problem."""
+        """Return the block and the output that a wire comes from; ``None`` after a problem."""
         name = at.rpartition(".")[2]
         source = self.drafts.get(wire.source_block)
         if source is None:
@@ -221,7 +221,7 @@ class WireCheck:
     def _candidates(
         self, target: BlockDraft, port: Input[Any], proposed: Iterable[str] = ()
     ) -> tuple[str, ...]:
-        """Outputs that could feed an input; those with the same type of signal come first.
+        """Return outputs that could feed an input; those with the same type of signal come first.
 
         What feeds another input of the block, or is ``proposed`` for one, is hardly meant twice.
         """
@@ -247,7 +247,7 @@ class WireCheck:
 
 
 def _fitting(source: BlockDraft, output: Output[Any], port: Input[Any]) -> Iterator[str]:
-    """The fields of an output of which an input with one field may select one."""
+    """Yield the fields of an output of which an input with one field may select one."""
     wanted, *more = port.signal.fields.values()
     asked = quantity_of(wanted) or UNCHECKED
     for name, given in output.signal.fields.items():
@@ -307,7 +307,7 @@ def compare(
 
 
 def _says_unit(source: BlockDraft) -> bool:
-    """Whether the source is a block whose parameter ``unit`` may still be set."""
+    """Return whether the source is a block whose parameter ``unit`` may still be set."""
     fields = type(source.params).model_fields if source.params is not None else {}
     return "unit" in fields and source.flat.parameters.get("unit") is None
 
@@ -350,7 +350,7 @@ def _shape_text(item: Field, shape: tuple[int, ...]) -> str:
 
 
 def fits(output: Output[Any], port: Input[Any], source: BlockDraft, target: BlockDraft) -> bool:
-    """Whether a wire from ``output`` to ``port`` would have no problem."""
+    """Return whether a wire from ``output`` to ``port`` would have no problem."""
     if output.truth and not port.reads_truth:
         return False
     if any(name not in output.signal.fields for name in port.signal.fields):

@@ -29,7 +29,7 @@ class WireElement:
     literal: Node | None = None
 
     def plain(self) -> Any:
-        """The piece as a graph file says it."""
+        """Return the piece as written in a graph file."""
         if self.literal is not None:
             return plain(self.literal)
         assert self.wire is not None
@@ -37,8 +37,8 @@ class WireElement:
 
 
 @dataclass(frozen=True)
-class WirePart(Generic[Item]):
-    """What one field of an input is made of: one item, or a list of several one behind another.
+class WireSlice(Generic[Item]):
+    """Source of one field of an input: one item, or a list of several one behind another.
 
     ``field`` is empty for the input's only field. Items are wires as they are written, and elements
     once sub-graphs are expanded.
@@ -52,7 +52,7 @@ class WirePart(Generic[Item]):
 
 @dataclass(frozen=True)
 class FlatWire(HasSource):
-    """What one input reads: the output ``source`` (``block.port``), a ``constant``, or ``parts``
+    """Source of one input: the output ``source`` (``block.port``), a ``constant``, or ``slices``
     that are put together."""
 
     source: str
@@ -61,30 +61,31 @@ class FlatWire(HasSource):
     initial: MapNode | None = None
     truth: bool = False
     constant: MapNode | None = None
-    parts: tuple[WirePart[WireElement], ...] = ()
+    slices: tuple[WireSlice[WireElement], ...] = ()
     shown: str = ""
-    """What stands in the graph in place of ``source``, where loading has put a block between."""
+    """Text in the graph in place of ``source``, where loading has put a block between."""
 
     @property
     def selected(self) -> str:
-        """What is written behind the source: ``.position[2]``."""
+        """Selection written behind the source: ``.position[2]``."""
         return self.shown.removeprefix(self.source) if self.shown else ""
 
     def inner(self) -> tuple[FlatWire, ...]:
-        """The wires that this one is made of: itself, or those of its parts; none of a constant."""
+        """Return the wires that this one is made of: itself, or those of its parts; none of a
+        constant."""
         if self.constant is not None:
             return ()
-        items = [item for part in self.parts for item in part.items]
-        return tuple(i.wire for i in items if i.wire is not None) if self.parts else (self,)
+        items = [item for wire_slice in self.slices for item in wire_slice.items]
+        return tuple(i.wire for i in items if i.wire is not None) if self.slices else (self,)
 
     def plain(self) -> Any:
-        """The wire as a graph file says it."""
+        """Return the wire as written in a graph file."""
         if self.constant is not None:
             return {"value": plain(self.constant)}
         source: Any = self.source
-        if self.parts:
-            one = len(self.parts) == 1 and not self.parts[0].field
-            fields = {part.field: plain_part(part) for part in self.parts}
+        if self.slices:
+            one = len(self.slices) == 1 and not self.slices[0].field
+            fields = {wire_slice.field: plain_slice(wire_slice) for wire_slice in self.slices}
             source = fields[""] if one else fields
         if not self.delay and not self.truth:
             return source
@@ -98,10 +99,10 @@ class FlatWire(HasSource):
         return data
 
 
-def plain_part(part: WirePart[WireElement]) -> Any:
-    """The part as a graph file says it."""
-    items = [item.plain() for item in part.items]
-    return items if part.is_list else items[0]
+def plain_slice(wire_slice: WireSlice[WireElement]) -> Any:
+    """Return the part as written in a graph file."""
+    items = [item.plain() for item in wire_slice.items]
+    return items if wire_slice.is_list else items[0]
 
 
 @dataclass(frozen=True)
@@ -119,15 +120,15 @@ class FlatBlock:
     offset: Node | None = None
     excused: tuple[str, ...] = ()
     input_places: Mapping[str, Position] = field(default_factory=dict)
-    """Where each wired input's name is written."""
+    """Place of the name of each wired input."""
     machine: Node | None = None
     """The name of the machine that the block is placed on."""
     background: MapNode | None = None
-    """How the block works in the background, if it does."""
+    """Settings for work in the background; ``None`` if the block has none."""
 
     @property
     def _settings(self) -> Mapping[str, Any]:
-        """What is given beside the block's use, parameters and wires, as plain data."""
+        """Settings given beside the block's use, parameters and wires, as plain data."""
         given = {
             "rate": self.rate,
             "offset": self.offset,
@@ -137,7 +138,7 @@ class FlatBlock:
         return {key: plain(node) for key, node in given.items() if node is not None}
 
     def plain(self) -> dict[str, Any]:
-        """The block as an entry of ``blocks``, as plain data."""
+        """Return the block as an entry of ``blocks``, as plain data."""
         return {
             "use": self.use,
             "with": plain(self.parameters),
@@ -146,7 +147,7 @@ class FlatBlock:
         }
 
     def text(self) -> str:
-        """The block as an entry of ``blocks``."""
+        """Return the block as an entry of ``blocks``."""
         lines = [f"  {self.path}:", f"    use: {text_of(self.use)}"]
         lines += _section("with", _escape(plain(self.parameters)))
         lines += _section("in", {name: wire.plain() for name, wire in self.wires.items()})
@@ -178,7 +179,7 @@ class FlatGraph:
     faults: MapNode | None = None
     overrides: Mapping[str, Any] = field(default_factory=dict)
     empty: bool = False
-    """No file has any blocks."""
+    """True if no file has any blocks."""
     incomplete: bool = False
     broken: tuple[str, ...] = ()
     subgraphs: Mapping[str, Mapping[str, FlatWire]] = field(default_factory=dict)
@@ -187,7 +188,7 @@ class FlatGraph:
     """The same for their inputs, ``block.port``, as far as each is one whole output."""
 
     def plain(self) -> dict[str, dict[str, Any]]:
-        """The entries of all blocks as plain data, by their paths."""
+        """Return the entries of all blocks as plain data, by their paths."""
         return {block.path: block.plain() for block in self.blocks}
 
     @property
@@ -220,7 +221,7 @@ class FlatGraph:
 
 
 def _section(key: str, data: Mapping[str, Any]) -> list[str]:
-    """The lines of a mapping inside a block: one line where it fits."""
+    """Return the lines of a mapping inside a block: one line where it fits."""
     if not data:
         return []
     line = f"    {key}: {text_of(data)}"
@@ -230,7 +231,8 @@ def _section(key: str, data: Mapping[str, Any]) -> list[str]:
 
 
 def _escape(value: Any) -> Any:
-    """The value with the leading ``$`` of every text doubled, which a file reads as one ``$``."""
+    """Return the value with the leading ``$`` of every text doubled, which a file reads as one
+    ``$``."""
     if isinstance(value, str):
         return f"${value}" if value.startswith("$") else value
     if isinstance(value, list):

@@ -36,7 +36,7 @@ _GivenWire = tuple[WrittenWire | None, Position, str]
 
 @dataclass(frozen=True)
 class _Scope:
-    """Where blocks are expanded: the root, or one use of a sub-graph."""
+    """Scope in which blocks are expanded: the root, or one use of a sub-graph."""
 
     bindings: Bindings
     instance: str | None = None
@@ -45,14 +45,14 @@ class _Scope:
     offset: Node | None = None
     machine: Node | None = None
     shifted: bool = False
-    """Whether the offset is said further out than the rate, so that it may exceed a period."""
+    """True if the offset is set in an outer scope than the rate, so that it may exceed a period."""
     sets: tuple[Override, ...] = ()
     wires: Mapping[str, _GivenWire] = field(default_factory=dict)
     """Wires that other files give, by ``block.input``."""
 
     @property
     def prefix(self) -> str:
-        """What stands in front of the paths of this scope's blocks."""
+        """Prefix of the paths of this scope's blocks."""
         return f"{self.instance}/" if self.instance else ""
 
 
@@ -63,11 +63,11 @@ class _GraphDraft:
     block: FlatBlock
     links: dict[str, WrittenWire | None]
     shifted: bool = False
-    """Whether the offset is inherited from further out than the rate."""
+    """True if the offset is inherited from an outer scope than the rate."""
 
 
 def flatten_file(path: Path, overrides: Overrides, problems: Problems) -> FlatGraph:
-    """The flat graph of a file; what is wrong is reported to ``problems`` and left out."""
+    """Flatten the graph in a file; what is wrong is reported to ``problems`` and left out."""
     similar = () if path.exists() else addresses_like(path)
     if similar:
         problems.add(
@@ -82,7 +82,7 @@ def flatten_file(path: Path, overrides: Overrides, problems: Problems) -> FlatGr
 
 
 def flatten_text(text: str, path: Path, overrides: Overrides, problems: Problems) -> FlatGraph:
-    """The flat graph of a text that stands for the file ``path``."""
+    """Flatten the graph in a text that stands for the file ``path``."""
     return _Flattener(problems).run(path, read_mapping(text, str(path), problems), overrides)
 
 
@@ -386,7 +386,8 @@ class _Flattener:
 
 
 def _finish(draft: _GraphDraft, resolver: Resolver) -> FlatBlock:
-    """The block, every wire of which comes from an output of a block that is no sub-graph."""
+    """Return the block, every wire of which comes from an output of a block that is no
+    sub-graph."""
     wires: dict[str, FlatWire] = {}
     excused = []
     for name, link in draft.links.items():
@@ -399,7 +400,7 @@ def _finish(draft: _GraphDraft, resolver: Resolver) -> FlatBlock:
 
 
 def _has_blocks(file: WrittenGraph) -> bool:
-    """Whether anything is written under ``blocks``, even if it is wrong."""
+    """Return whether anything is written under ``blocks``, even if it is wrong."""
     entry = file.tree.get("blocks")
     if entry is None:
         return False

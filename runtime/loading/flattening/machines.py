@@ -14,9 +14,9 @@ from dataclasses import replace
 
 from ....files.nodes import Entry, MapNode, Node, ScalarNode, kind, text_of
 from ....files.problems import Code, Problems, listing, nearest
-from ...language.fault import FOLDER
+from ...language.signal_error import FOLDER
 from ...language.stages import BlockSpec, CheckedGraph, MachineSpec
-from ...transports.registry import EXAMPLE, endpoint_fault, transport_type
+from ...transports.registry import EXAMPLE, endpoint_problem, transport_type
 from .flat import FlatBlock, FlatGraph
 from .subgraphs import Instance
 
@@ -29,7 +29,8 @@ def placed(
     instances: Mapping[str, Instance],
     problems: Problems,
 ) -> tuple[FlatBlock, ...]:
-    """The blocks with the machines that the graph's ``place`` gives them; the most special wins."""
+    """Return the blocks with the machines that the graph's ``place`` gives them; the most special
+    wins."""
     found: dict[str, Node] = {entry.key: entry.value for entry in places or ()}
     paths = [*(block.path for block in blocks), *instances]
     broken = any(instance.broken for instance in instances.values())
@@ -57,7 +58,7 @@ def placed(
 
 
 def read_machines(graph: FlatGraph, problems: Problems) -> tuple[MachineSpec, ...]:
-    """The machines of a graph; also checks that every block is placed on one of them."""
+    """Read the machines of a graph; also check that every block is placed on one of them."""
     machines: list[MachineSpec] = []
     for entry in graph.machines or ():
         machine = _read_machine(entry, problems)
@@ -111,7 +112,7 @@ def read_machines(graph: FlatGraph, problems: Problems) -> tuple[MachineSpec, ..
 def on_machines(
     checked: CheckedGraph, graph: FlatGraph, machines: tuple[MachineSpec, ...]
 ) -> CheckedGraph:
-    """The checked graph with its machines and the place of every block.
+    """Return the checked graph with its machines and the place of every block.
 
     Delays and constants that loading inserted run where the block that reads them runs. So the
     value of a delayed wire has a whole period to travel.
@@ -154,7 +155,7 @@ def _read_machine(entry: Entry, problems: Problems) -> MachineSpec | None:
         )
         return None
     text = entry.value.value if isinstance(entry.value, ScalarNode) else None
-    reason = endpoint_fault(text) if isinstance(text, str) else "it is no text"
+    reason = endpoint_problem(text) if isinstance(text, str) else "it is no text"
     if reason:
         problems.add(
             Code.MACHINE,

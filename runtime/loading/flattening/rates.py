@@ -14,7 +14,7 @@ from .flat import FlatBlock
 
 
 def read_period(flat: FlatBlock, base_rate: float, problems: Problems) -> int:
-    """The ticks between two runs of a block; 1 after a problem."""
+    """Read the ticks between two runs of a block; 1 after a problem."""
     if flat.rate is None:
         return 1
     rate = read_quantity(flat.rate, f"{flat.path}.rate", "Hz", problems)
@@ -40,7 +40,7 @@ def read_period(flat: FlatBlock, base_rate: float, problems: Problems) -> int:
 
 
 def _rate_text(base_rate: float, period: int) -> str:
-    """A rate to paste: as a decimal number where that is exact, else as a fraction."""
+    """Format a rate to paste: as a decimal number where that is exact, else as a fraction."""
     decimal = f"{base_rate / period:.6g}"
     if abs(float(decimal) * period - base_rate) <= 1e-12 * base_rate:
         return f"{decimal} Hz"
@@ -48,7 +48,7 @@ def _rate_text(base_rate: float, period: int) -> str:
 
 
 def read_offset(flat: FlatBlock, period: int, problems: Problems) -> int:
-    """The tick of a block's first run; 0 after a problem."""
+    """Read the tick of a block's first run; 0 after a problem."""
     if flat.offset is None:
         return 0
     node = flat.offset
@@ -72,10 +72,10 @@ def read_offset(flat: FlatBlock, period: int, problems: Problems) -> int:
 
 
 def wrap_offset(flat: FlatBlock, base_rate: Node | None) -> FlatBlock:
-    """A block of a sub-graph whose use gives the offset, while the rate is the block's own.
+    """Reduce an offset that the use of a sub-graph gives to less than the period of the block.
 
-    The whole sub-graph is shifted by that offset. Where this is longer than the block's period,
-    what is left of it after whole periods says the same.
+    The whole sub-graph is shifted by that offset. Where this is longer than the block's period, the
+    remainder after whole periods is equivalent.
     """
     node, unheard = flat.offset, Problems()
     offset = node.value if isinstance(node, ScalarNode) else None

@@ -13,7 +13,7 @@ from ....files.nodes import ListNode, MapNode, Node, ScalarNode, kind, plain, te
 from ....files.problems import Code, Position, Problems, fix_for_key, listing, nearest
 from ..reading.selection import WHOLE, Selection
 from ..reading.written import WrittenGraph
-from .flat import FlatBlock, FlatWire, WireElement, WirePart
+from .flat import FlatBlock, FlatWire, WireElement, WireSlice
 from .written_wires import WrittenWire
 
 UNWIRED = "unwired"
@@ -93,7 +93,7 @@ class Resolver:
         self.problems = problems
 
     def resolve(self, link: WrittenWire | None, at: str) -> FlatWire | str | None:
-        """The wire that a link stands for, ``UNWIRED``, or ``None`` after a problem."""
+        """Return the wire that a link stands for, ``UNWIRED``, or ``None`` after a problem."""
         if link is None:
             return None
         start = link
@@ -114,7 +114,7 @@ class Resolver:
                 total = replace(total, delay=link.delay, initial=link.initial)
             if link.truth:
                 total = replace(total, truth=True)
-            if link.parts:
+            if link.slices:
                 return self._resolve_composite(
                     link, replace(total, where=start.where), selection, at
                 )
@@ -138,7 +138,7 @@ class Resolver:
             elif selection:
                 inner = FlatWire(link.source, start.where, truth=total.truth)
                 item = WireElement(start.where, inner, selection)
-                return replace(total, parts=(WirePart("", start.where, (item,)),))
+                return replace(total, slices=(WireSlice("", start.where, (item,)),))
             else:
                 return replace(total, source=link.source)
             if following is None or isinstance(following, str):
@@ -148,23 +148,25 @@ class Resolver:
     def _resolve_composite(
         self, link: WrittenWire, total: FlatWire, selection: Selection, at: str
     ) -> FlatWire | None:
-        """The wire of a link with parts, of which ``selection`` takes something."""
-        parts = link.parts
+        """Return the wire of a link with parts, of which ``selection`` takes something."""
+        slices = link.slices
         if selection.field:
-            parts = tuple(part for part in parts if part.field == selection.field)
-            if not parts:
-                names = listing(part.field for part in link.parts if part.field)
+            slices = tuple(
+                wire_slice for wire_slice in slices if wire_slice.field == selection.field
+            )
+            if not slices:
+                names = listing(wire_slice.field for wire_slice in link.slices if wire_slice.field)
                 self._selection(
                     f"there is no field {selection.field!r}; there is {names}", link, at
                 )
                 return None
-        if selection.indices and (len(parts) > 1 or parts[0].is_list):
+        if selection.indices and (len(slices) > 1 or slices[0].is_list):
             self._selection("elements cannot be selected of several sources", link, at)
             return None
         resolved = []
-        for part in parts:
+        for wire_slice in slices:
             items = []
-            for each in part.items:
+            for each in wire_slice.items:
                 if each.literal is not None:
                     items.append(WireElement(each.where, literal=each.literal))
                     continue
@@ -175,15 +177,17 @@ class Resolver:
                     self._selection("a part comes from an input that is not wired", each, at)
                     return None
                 items += self._pieces(wire, selection, total)
-            resolved.append(WirePart(part.field, part.where, tuple(items), part.is_list))
+            resolved.append(
+                WireSlice(wire_slice.field, wire_slice.where, tuple(items), wire_slice.is_list)
+            )
         if selection.field:
             resolved = [replace(resolved[0], field="")]
-        return replace(total, parts=tuple(resolved))
+        return replace(total, slices=tuple(resolved))
 
     def _pieces(self, wire: FlatWire, selection: Selection, total: FlatWire) -> list[WireElement]:
-        """The pieces that a resolved wire adds to a part."""
+        """Return the pieces that a resolved wire adds to a part."""
         rest = Selection("", selection.indices)
-        if not wire.parts:
+        if not wire.slices:
             inner = replace(wire, truth=wire.truth or total.truth)
             return [WireElement(wire.where, inner, rest)]
         return [
@@ -199,21 +203,21 @@ class Resolver:
                 if item.wire is not None
                 else None,
             )
-            for part in wire.parts
-            for item in part.items
+            for wire_slice in wire.slices
+            for item in wire_slice.items
         ]
 
     def _of_constant(
         self, constant: MapNode, selection: Selection, start: WrittenWire, at: str
     ) -> FlatWire | None:
-        """A part of constant values, which is a number again."""
+        """Return a part of constant values, which is a number again."""
         entry = constant.get(selection.field) if selection.field else None
         if selection.indices or (entry is None and len(constant.entries) != 1):
             self._selection(f"{str(selection)!r} cannot be selected of a constant", start, at)
             return None
         node = (entry or constant.entries[0]).value
         item = WireElement(start.where, literal=node)
-        return FlatWire("", start.where, parts=(WirePart("", start.where, (item,)),))
+        return FlatWire("", start.where, slices=(WireSlice("", start.where, (item,)),))
 
     def _selection(self, message: str, link: WrittenWire, at: str) -> None:
         self.problems.add(
@@ -221,7 +225,7 @@ class Resolver:
         )
 
     def outputs(self) -> dict[str, dict[str, FlatWire]]:
-        """For every sub-graph block that was expanded, where its outputs come from."""
+        """Return, for every sub-graph block that was expanded, the sources of its outputs."""
         found: dict[str, dict[str, FlatWire]] = {}
         for path, instance in self.instances.items():
             if instance.broken:
@@ -231,8 +235,8 @@ class Resolver:
         return found
 
     def inputs(self) -> dict[str, dict[str, str]]:
-        """For every sub-graph block, the output ``block.port`` that each of its inputs is wired to;
-        those that are put together, selected or constant are left out."""
+        """Return, for every sub-graph block, the output ``block.port`` that each of its inputs is
+        wired to; those that are put together, selected or constant are left out."""
         found: dict[str, dict[str, str]] = {}
         for path, instance in self.instances.items():
             wires = {n: self.resolve(link, f"{path}.{n}") for n, link in instance.links.items()}
@@ -323,7 +327,7 @@ class Resolver:
 def parameter_values(
     block: FlatBlock, subgraph: WrittenGraph, problems: Problems
 ) -> dict[str, Node] | None:
-    """The values of a sub-graph's parameters for one use; ``None`` if one is missing."""
+    """Return the values of a sub-graph's parameters for one use; ``None`` if one is missing."""
     declared = {entry.key: entry for entry in subgraph.parameters}
     misspelt: dict[str, None] = {}
     for entry in block.parameters:
@@ -378,7 +382,7 @@ class Bindings:
     problems: Problems
 
     def substitute(self, node: Node) -> Node:
-        """The tree with every ``$name`` replaced; ``$$text`` is the text ``$text``."""
+        """Return the tree with every ``$name`` replaced; ``$$text`` is the text ``$text``."""
         if isinstance(node, ScalarNode):
             text = node.value
             if not isinstance(text, str) or not text.startswith("$"):

@@ -12,7 +12,7 @@ from ...language.units import QUANTITY
 from ..reading.graph_file import SOURCE_KEYS, WIRE_KEYS
 from ..reading.selection import WHOLE, Selection, read_selection
 from ..reading.written import unknown_key, wrong_kind
-from .flat import WirePart
+from .flat import WireSlice
 
 _EXAMPLE = "block.port, block.port.field[2], or {from: block.port, delay: 1}"
 _ITEM_EXAMPLE = "block.port, block.port.field[2], or a number"
@@ -23,7 +23,7 @@ class WrittenWire:
     """One end of a wire as it is written; ``instance`` is set for a sub-graph's own input.
 
     ``source`` is the absolute ``block.port``, or the input's name where ``instance`` is set. A wire
-    that is put together from several sources has ``parts`` instead, and a number is a ``literal``.
+    that is put together from several sources has ``slices`` instead, and a number is a ``literal``.
     """
 
     where: Position
@@ -35,13 +35,13 @@ class WrittenWire:
     constant: MapNode | None = None
     selection: Selection = WHOLE
     literal: Node | None = None
-    parts: tuple[WirePart[WrittenWire], ...] = ()
+    slices: tuple[WireSlice[WrittenWire], ...] = ()
 
 
 def read_wire(
     node: Node, prefix: str, instance: str | None, at: str, problems: Problems
 ) -> WrittenWire | None:
-    """The link that an input's value writes; ``None`` after a problem.
+    """Read the link in an input's value; ``None`` after a problem.
 
     Block paths get ``prefix`` in front; ``inputs.name`` is an input of the sub-graph ``instance``.
     """
@@ -84,7 +84,7 @@ def read_wire(
 
 
 def _is_by_field(keys: Mapping[str, Entry]) -> bool:
-    """Whether a mapping gives a source for every field: ``{value: e.y.value[2]}``."""
+    """Return whether a mapping gives a source for every field: ``{value: e.y.value[2]}``."""
     if not keys or any(key in SOURCE_KEYS for key in keys):
         return False
     if any(isinstance(entry.value, MapNode) for entry in keys.values()):
@@ -100,42 +100,42 @@ def _read_fields(
     at: str,
     problems: Problems,
 ) -> WrittenWire | None:
-    parts = []
+    slices = []
     for key, entry in keys.items():
         value = entry.value
         if isinstance(value, MapNode):
             wrong_kind(value, f"field {key!r} of {at}", _ITEM_EXAMPLE, problems, at=at)
             return None
-        part = _read_part(key, value, prefix, instance, at, problems)
-        if part is None:
+        wire_slice = _read_slice(key, value, prefix, instance, at, problems)
+        if wire_slice is None:
             return None
-        parts.append(replace(part, where=entry.key_where))
-    return WrittenWire(node.where, parts=tuple(parts))
+        slices.append(replace(wire_slice, where=entry.key_where))
+    return WrittenWire(node.where, slices=tuple(slices))
 
 
 def _read_expression(
     node: ScalarNode | ListNode, prefix: str, instance: str | None, at: str, problems: Problems
 ) -> WrittenWire | None:
-    """A source, a number, or a list of these."""
+    """Read a source, a number, or a list of these."""
     if isinstance(node, ScalarNode) and not is_number(node):
         return _read_source(node, prefix, instance, at, problems)
-    part = _read_part("", node, prefix, instance, at, problems)
-    return WrittenWire(node.where, parts=(part,)) if part is not None else None
+    wire_slice = _read_slice("", node, prefix, instance, at, problems)
+    return WrittenWire(node.where, slices=(wire_slice,)) if wire_slice is not None else None
 
 
-def _read_part(
+def _read_slice(
     field: str,
     node: ScalarNode | ListNode,
     prefix: str,
     instance: str | None,
     at: str,
     problems: Problems,
-) -> WirePart[WrittenWire] | None:
+) -> WireSlice[WrittenWire] | None:
     if _all_numbers(node):
-        return WirePart(field, node.where, (WrittenWire(node.where, literal=node),))
+        return WireSlice(field, node.where, (WrittenWire(node.where, literal=node),))
     if isinstance(node, ScalarNode):
         link = _read_source(node, prefix, instance, at, problems)
-        return WirePart(field, node.where, (link,)) if link is not None else None
+        return WireSlice(field, node.where, (link,)) if link is not None else None
     items = []
     for item in node.items:
         if not isinstance(item, ScalarNode):
@@ -148,11 +148,12 @@ def _read_part(
         if link is None:
             return None
         items.append(link)
-    return WirePart(field, node.where, tuple(items), is_list=True)
+    return WireSlice(field, node.where, tuple(items), is_list=True)
 
 
 def is_number(node: ScalarNode) -> bool:
-    """Whether a value is a number, a truth value, or a number with a unit such as ``3 mm``."""
+    """Return whether a value is a number, a truth value, or a number with a unit such as ``3
+    mm``."""
     if not isinstance(node.value, str):
         return node.value is not None
     return QUANTITY.match(node.value) is not None

@@ -27,14 +27,15 @@ FOLDER = Path(__file__).parents[3] / "graphs"
 
 
 def shipped_graphs() -> dict[str, Path]:
-    """The files of all shipped graphs by address, such as ``aloft:jump``, sorted."""
+    """Return the files of all shipped graphs by address, such as ``aloft:jump``, sorted."""
     files = [*FOLDER.glob("*.yaml"), *FOLDER.glob("robots/*.yaml")]
     by_name = {path.relative_to(FOLDER).with_suffix("").as_posix(): path for path in files}
     return {f"{PREFIX}{name}": by_name[name] for name in sorted(by_name)}
 
 
 def graph_path(path: str | Path, folder: Path = Path()) -> Path:
-    """The file that a path, seen from ``folder``, or an address stands for; an unknown address is no file."""
+    """Return the file that a path, seen from ``folder``, or an address stands for; an unknown
+    address is no file."""
     text = str(path)
     if not text.startswith(PREFIX):
         return folder / path
@@ -43,7 +44,7 @@ def graph_path(path: str | Path, folder: Path = Path()) -> Path:
 
 
 def addresses_like(path: Path) -> tuple[str, ...]:
-    """The addresses of shipped files that may be meant by a path where there is no file."""
+    """Return the addresses of shipped files that may be meant by a path where there is no file."""
     known = {
         f"{PREFIX}{file.relative_to(FOLDER).with_suffix('').as_posix()}"
         for file in FOLDER.rglob("*.yaml")
@@ -65,7 +66,7 @@ def files_like(name: str, folder: Path) -> tuple[str, ...]:
 
 
 def summary(path: Path) -> str:
-    """What the comment at the top of a file says first; empty where there is none."""
+    """Return the first sentence of the comment at the top of a file; empty where there is none."""
     words: list[str] = []
     for line in path.read_text(encoding="utf-8").splitlines():
         if not line.startswith("# "):
@@ -83,7 +84,7 @@ class FileTree:
         self.incomplete = False
 
     def read(self, path: Path, shown: str, *, subgraph: bool) -> WrittenGraph | None:
-        """A file as a graph or a sub-graph; ``None`` after a problem."""
+        """Read a file as a graph or a sub-graph; ``None`` after a problem."""
         key = (path, subgraph)
         if key not in self.known:
             tree = read_file(path, shown, self.problems)
@@ -94,7 +95,7 @@ class FileTree:
         return self.known[key]
 
     def locate(self, node: ScalarNode, file: WrittenGraph, stack: Stack) -> tuple[Path, str] | None:
-        """The file that ``node`` names, seen from ``file``; ``None`` after a problem."""
+        """Find the file that ``node`` names, seen from ``file``; ``None`` after a problem."""
         name = str(node.value)
         shown = os.path.normpath(graph_path(name, Path(file.file).parent))
         try:
@@ -173,7 +174,7 @@ class FileTree:
 
 
 def settings_of(path: Path) -> dict[str, Any]:
-    """Everything that a file and those it includes ``set``, as plain data.
+    """Return all values that a file and those it includes ``set``, as plain data.
 
     Raises:
         LoadError: one of the files cannot be read.
@@ -206,7 +207,7 @@ _KINDS: Mapping[str, tuple[tuple[str, ...], str]] = {
 
 
 def is_another_kind(tree: MapNode, shown: str, problems: Problems) -> bool:
-    """Whether a file given as a graph is none; then that is noted, with what to do with it.
+    """Return whether a file given as a graph is none; then note it, with the fix.
 
     A file with a key that only graphs have is a graph, however wrong the others are.
     """
@@ -232,7 +233,7 @@ def is_another_kind(tree: MapNode, shown: str, problems: Problems) -> bool:
 
 
 def _is_to_be_included(tree: MapNode, keys: list[str], shown: str, problems: Problems) -> bool:
-    """Whether a file changes or reads blocks that only a graph has which includes it.
+    """Return whether a file changes or reads blocks that only a graph that includes it has.
 
     A file with blocks of its own counts if it needs two more at least: one may be misspelt.
     """

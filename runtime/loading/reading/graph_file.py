@@ -16,7 +16,7 @@ from ....files.nodes import MapNode, kind, plain
 from ....files.problems import Code, Problems
 from ....files.validation import find_mistakes, info_at, path_text
 from ...language.errors import UnitError
-from ...language.fault import FaultKind
+from ...language.signal_error import SignalErrorKind
 from ...language.stages import ClockKind, LinkMode, Overrun, WhenLate
 from ...language.units import parse_quantity
 
@@ -24,7 +24,7 @@ EXAMPLES = {"Hz": "500 Hz", "s": "4 s"}
 
 
 def positive_quantity(value: object, unit: str) -> float:
-    """A positive number in ``unit``, from a number or a text with a unit.
+    """Read a positive number in ``unit``, from a number or a text with a unit.
 
     Raises:
         UnitError: it is none; the text is empty where there is no more to say.
@@ -49,7 +49,7 @@ def _seconds(value: object) -> float:
 
 
 def _key(text: str, written: str = "", **schema: Any) -> Any:
-    """A key that may be missing; ``written`` where Python has another use for the word."""
+    """Declare a key that may be missing; ``written`` where Python has another use for the word."""
     return Field(
         default_factory=lambda: None,
         alias=written or None,
@@ -91,7 +91,7 @@ Items = Annotated[
 
 
 def keys_of(model: type[BaseModel]) -> tuple[str, ...]:
-    """The keys that a model declares, as they are written."""
+    """Return the keys that a model declares, as they are written."""
     return tuple(info.alias or name for name, info in model.model_fields.items())
 
 
@@ -127,11 +127,11 @@ WIRE_KEYS = (*SOURCE_KEYS, *keys_of(WireValue))
 
 
 Wire: TypeAlias = Item | Items | Fields | WireFrom | WireValue
-"""What an input reads."""
+"""Source of an input."""
 
 
 class BackgroundKeys(_Keys):
-    """How a block works in the background."""
+    """Keys of a block that works in the background."""
 
     latency: Seconds = _key("the time after which outputs appear: a multiple of the block's period")
     late: WhenLate = _key(
@@ -161,7 +161,7 @@ class BlockEntry(_Keys):
 
 
 class ClockKeys(_Keys):
-    """How a run is paced."""
+    """Keys of the pacing of a run."""
 
     kind: ClockKind = _key("as fast as possible, by wall time, or by the robot")
     overrun: Overrun = _key("what follows where a tick takes too long")
@@ -172,7 +172,7 @@ class ClockKeys(_Keys):
 
 
 class LinkKeys(_Keys):
-    """How late messages are treated."""
+    """Keys of the policy on late messages."""
 
     max_age: Seconds = _key("the age at which 'late' takes effect")
     late: WhenLate = _key("keep the last values, read zeros, or end the run")
@@ -180,7 +180,7 @@ class LinkKeys(_Keys):
 
 
 class Links(LinkKeys):
-    """How the machines keep together."""
+    """Settings by which the machines keep together."""
 
     mode: LinkMode = _key("wait for each other, or run free")
     of: dict[str, LinkKeys] = _key("the links of single blocks, by block")
@@ -197,13 +197,13 @@ class GraphValues(_Keys):
     actuators: str = _key("the robot's actuator profile in use; by default its first")
 
 
-class FaultKeys(_Keys):
+class SignalErrorKeys(_Keys):
     """A fault on a wire; which keys it has depends on its kind."""
 
     on: Source | list[Source] = Field(
         description="an output, an input, or elements of one: where it is"
     )
-    kind: FaultKind = Field(description="what goes wrong")
+    kind: SignalErrorKind = Field(description="what goes wrong")
     when: str = _key("the event that it begins after: block.port.field == value")
     start: Seconds = _key("when it begins, after the start or its event")
     start_spread: Seconds = _key("up to so much later, drawn by the seed")
@@ -225,7 +225,7 @@ class GraphSections(_Keys):
     machines: dict[str, str] = _key("machines that share the graph: name and endpoint")
     place: dict[str, str] = _key("block or sub-graph: machine; wins over 'on'")
     links: Links = _key("how the machines keep together")
-    faults: dict[str, FaultKeys] = _key("faults on wires, by name")
+    faults: dict[str, SignalErrorKeys] = _key("faults on wires, by name")
 
 
 class SubgraphKeys(_Keys):
@@ -263,7 +263,8 @@ _WRONG_KINDS = {"dict_type", "model_type", "bool_type"}
 def read_section(
     node: MapNode, name: str, model: type[BaseModel], problems: Problems
 ) -> dict[str, Any]:
-    """What a section of the graph gives; what is wrong is reported to ``problems`` and left out."""
+    """Read the values of a section of the graph; what is wrong is reported to ``problems`` and left
+    out."""
     data = plain(node)
     try:
         return model.model_validate(data).model_dump(exclude_unset=True)

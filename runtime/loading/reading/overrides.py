@@ -35,13 +35,13 @@ class Override:
     where: Position
 
 
-def place_of(text: str) -> Position:
-    """The place of an override: the override itself."""
+def location_of(text: str) -> Position:
+    """Return the place of an override: the override itself."""
     return Position(f"--set {text}", 0, 0)
 
 
 def read_overrides(overrides: Overrides, problems: Problems) -> tuple[Override, ...]:
-    """Overrides of the whole run; the last one of a key wins."""
+    """Read the overrides of the whole run; the last one of a key wins."""
     pairs: list[tuple[str, Node, Position]] = []
     if isinstance(overrides, Mapping):
         for key, value in overrides.items():
@@ -49,12 +49,12 @@ def read_overrides(overrides: Overrides, problems: Problems) -> tuple[Override, 
                 pairs.append((str(key), value.value, value.key_where))
                 continue
             shown = value.tolist() if hasattr(value, "tolist") else value
-            where = place_of(f"{key}={_short(shown)}")
+            where = location_of(f"{key}={_short(shown)}")
             pairs.append((str(key), from_plain(value, where), where))
     else:
         for text in overrides:
             key, equals, value_text = text.partition("=")
-            where = place_of(text)
+            where = location_of(text)
             if not equals:
                 problems.add(
                     Code.OVERRIDE,
@@ -86,7 +86,7 @@ def read_overrides(overrides: Overrides, problems: Problems) -> tuple[Override, 
 
 
 def read_sets(entries: Iterable[Entry], prefix: str, problems: Problems) -> tuple[Override, ...]:
-    """The entries of a file's ``set``; block paths get ``prefix`` in front."""
+    """Read the entries of a file's ``set``; block paths get ``prefix`` in front."""
     found = []
     for entry in entries:
         override = _parameter_override(entry.key, entry.value, entry.key_where)
@@ -105,7 +105,7 @@ def read_sets(entries: Iterable[Entry], prefix: str, problems: Problems) -> tupl
 
 
 def _parameter_override(key: str, value: Node, where: Position) -> Override | None:
-    """The override that ``block.parameter`` names; ``None`` if the key has another form."""
+    """Return the override that ``block.parameter`` names; ``None`` if the key has another form."""
     block, *path = key.split(".")
     if block and path and all(path):
         return Override(key, block, tuple(path), value, where)
@@ -113,7 +113,7 @@ def _parameter_override(key: str, value: Node, where: Position) -> Override | No
 
 
 def _read_text(text: str, where: Position, problems: Problems) -> Node | None:
-    """A value written as YAML, all of it placed at the override."""
+    """Read a value written as YAML, all of it placed at the override."""
     own = Problems()
     node = read_value(text, where.file, own)
     for problem in own.report(where.file).problems:
@@ -138,14 +138,15 @@ def _short(value: Any) -> str:
 
 
 def is_graph_key(override: Override, names: Iterable[str]) -> bool:
-    """Whether an override sets a key of the graph itself, such as ``rate`` or ``clock.kind``."""
+    """Return whether an override sets a key of the graph itself, such as ``rate`` or
+    ``clock.kind``."""
     if not override.block:
         return True
     return override.block in SECTION_KEYS and override.block not in names
 
 
 def merge(graph: MapNode, path: Sequence[str], value: Node, where: Position) -> MapNode:
-    """The graph's keys with the value at ``path`` set; later mappings add to earlier ones.
+    """Set the value at ``path`` in the graph's keys; later mappings add to earlier ones.
 
     Included files and overrides of the graph both come here.
     """

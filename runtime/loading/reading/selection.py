@@ -36,7 +36,7 @@ class Selection:
         return (f".{self.field}" if self.field else "") + "".join(f"[{i}]" for i in self.indices)
 
     def of(self, inner: Selection) -> Selection:
-        """This selection of what another one has selected.
+        """Return this selection of the elements that another one has selected.
 
         Raises:
             ValueError: a field cannot be selected of a field, or of some elements.
@@ -51,7 +51,8 @@ WHOLE = Selection()
 
 
 def read_selection(text: str) -> tuple[str, Selection] | None:
-    """The ``block.port`` and the selection in a source's text; ``None`` if it is not a source."""
+    """Read the ``block.port`` and the selection in a source's text; ``None`` if it is not a
+    source."""
     match = _TEXT.match(text)
     if match is None:
         return None
@@ -63,13 +64,14 @@ def read_selection(text: str) -> tuple[str, Selection] | None:
 def select(
     selection: Selection, shape: tuple[int, ...], names: Sequence[str] = ()
 ) -> NDArray[np.int64]:
-    """The elements that are selected of an array of this ``shape``, by their place in row order.
+    """Return the elements that are selected of an array of this ``shape``, by their place in row
+    order.
 
     ``names`` are those of the array's rows, if they have any. The result has the shape of what is
     selected.
 
     Raises:
-        ValueError: an index cannot be read, is outside, or selects nothing; the text says which.
+        ValueError: an index cannot be read, is outside, or selects nothing; the text tells which.
     """
     places = np.arange(int(np.prod(shape)), dtype=np.int64).reshape(shape)
     own_names: Sequence[str] = names
@@ -96,7 +98,7 @@ def _apply(index: str, places: NDArray[np.int64], names: Sequence[str]) -> NDArr
 
 
 def _key(part: str, size: int, names: Sequence[str]) -> int | NDArray[np.int64]:
-    """The element or the elements of an axis that a text names."""
+    """Find the element or the elements of an axis that a text names."""
     ends = part.split(":")
     if len(ends) > 3:
         raise ValueError(f"[{part}] is not a slice")
@@ -122,7 +124,7 @@ def _key(part: str, size: int, names: Sequence[str]) -> int | NDArray[np.int64]:
 
 
 def _place(text: str, size: int, names: Sequence[str], *, end: bool = False) -> int:
-    """The number that a text is, or the place of the element it names.
+    """Find the number that a text is, or the place of the element it names.
 
     A slice ends before a number, and behind a name.
     """

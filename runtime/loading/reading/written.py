@@ -161,7 +161,7 @@ def _read_include(entry: Entry | None, problems: Problems) -> tuple[ScalarNode, 
 
 
 def _ascii(name: str) -> str:
-    """A name like this one in the letters that names may have; empty where there is none."""
+    """Return a name like this one in the letters that names may have; empty where there is none."""
     for letters, instead_of in (("ae", "ä"), ("oe", "ö"), ("ue", "ü"), ("ss", "ß")):
         name = name.replace(instead_of, letters)
     name = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
@@ -220,7 +220,7 @@ def _read_block(entry: Entry, problems: Problems) -> WrittenBlock | None:
 
 
 def read_quantity(node: Node, what: str, unit: str, problems: Problems) -> float | None:
-    """A positive quantity as a number, or text with a unit."""
+    """Read a positive quantity as a number, or text with a unit."""
     try:
         return positive_quantity(node.value if isinstance(node, ScalarNode) else None, unit)
     except UnitError as error:

@@ -16,7 +16,7 @@ import quadprog
 import aloft
 from aloft.benchmarks.full_program import FullProgram
 from aloft.blocks.control.whole_body_controller import WholeBodyController
-from aloft.blocks.control.whole_body_solver import LibrarySolver
+from aloft.blocks.control.whole_body_solver import ExternalSolver
 from aloft.mathematics.active_set import INFEASIBLE
 from aloft.mathematics.quadratic_program import QuadraticProgramSolver
 from aloft.mathematics.whole_body_qp import SOLVED
@@ -79,7 +79,7 @@ class Solvers:
         self.block, self.full = block, FullProgram(block)
         self.daqp, self.clarabel = map(QuadraticProgramSolver, ("daqp", "clarabel"))
         program, reduction, *_, solution = block._solve.arguments
-        self.reduced = LibrarySolver("daqp", "pyramid", program, reduction, solution)
+        self.reduced = ExternalSolver("daqp", "pyramid", program, reduction, solution)
 
     def set(self, state: State, stance: np.ndarray) -> None:
         block = self.block

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from aloft.blocks.estimation.motion_capture import MotionCapture, PlaceCorrection
+from aloft.blocks.estimation.motion_capture import MotionCapture, PoseCorrection
 from aloft.mathematics.rotations import yaw
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
@@ -20,7 +20,7 @@ def turned(heading: float) -> list[float]:
 def show(bench: BlockBench, x: float, heading: float = 0.0):
     bench.set("truth", base_position=[x, 2.0 * x, 0.5], base_orientation=turned(heading))
     bench.step()
-    place = bench.get("place")
+    place = bench.get("pose")
     return int(place.number), float(place.time), np.array(place.position), float(place.heading)
 
 
@@ -59,7 +59,7 @@ def test_a_latency_of_too_many_runs_is_refused() -> None:
 
 def test_a_drift_of_place_and_heading_is_taken_off() -> None:
     """The robot walks in a circle; its estimate lies 0.3 m off, turned by 0.4 rad, and tilts."""
-    bench = BlockBench(PlaceCorrection)
+    bench = BlockBench(PoseCorrection)
     late, truths = 20, []
     for tick in range(1500):
         angle = 0.002 * tick
@@ -75,7 +75,7 @@ def test_a_drift_of_place_and_heading_is_taken_off() -> None:
         if tick >= late and tick % 5 == 0 and tick < 1200:
             (x, y), heading = truths[tick - late]
             bench.set(
-                "place", number=tick, time=PERIOD * (tick - late), position=[x, y, 0.7],
+                "pose", number=tick, time=PERIOD * (tick - late), position=[x, y, 0.7],
                 heading=heading,
             )  # fmt: skip
         bench.step()
@@ -93,11 +93,11 @@ def test_a_drift_of_place_and_heading_is_taken_off() -> None:
 
 def test_noise_is_averaged() -> None:
     rng, errors = np.random.default_rng(3), []
-    bench = BlockBench(PlaceCorrection, {"gain": 0.02})
+    bench = BlockBench(PoseCorrection, {"gain": 0.02})
     for tick in range(3000):
         bench.set("state", position=[0.1, 0.2, 0.5], orientation=turned(0.3))
         bench.set(
-            "place", number=tick + 1, time=PERIOD * tick, heading=0.3 + 0.01 * rng.normal(),
+            "pose", number=tick + 1, time=PERIOD * tick, heading=0.3 + 0.01 * rng.normal(),
             position=[0.1 + 0.005 * rng.normal(), 0.2 + 0.005 * rng.normal(), 0.0],
         )  # fmt: skip
         bench.step()

@@ -1,4 +1,4 @@
-"""``blocks.Library``: an exported library in the place of the blocks that it was made of."""
+"""``blocks.CLibrary``: an exported library in the place of the blocks that it was made of."""
 
 import json
 import shutil
@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import aloft
-from aloft.blocks.general.library import Library
+from aloft.blocks.general.library import CLibrary
 from aloft.clib.write import write_library
 from aloft.files.problems import LoadError
 from aloft.logs.recording.recorder import Recorder
@@ -66,7 +66,7 @@ def with_library(*parts: str, more: str = "") -> str:
     text = RAIL
     for part in parts:
         text = text.replace(
-            f"use: {part}.yaml", f"use: blocks.Library, with: {{folder: {part}{more}}}"
+            f"use: {part}.yaml", f"use: blocks.CLibrary, with: {{folder: {part}{more}}}"
         )
     return text
 
@@ -122,7 +122,7 @@ def test_a_snapshot_and_a_replay_have_the_library(folder: Path, tmp_path: Path) 
 @pytest.mark.parametrize("case", conformance_cases())
 def test_conformance(folder: Path, part: str, case: str) -> None:
     params = {"folder": str(folder / part)}
-    check_block(Library, params=params, rate=500.0, cases=[case])
+    check_block(CLibrary, params=params, rate=500.0, cases=[case])
 
 
 @needs_compiler
@@ -142,7 +142,7 @@ def test_live_parameters_are_set_and_their_names_checked(folder: Path) -> None:
 @needs_compiler
 def test_a_step_that_fails_ends_the_run_with_its_code(folder: Path) -> None:
     with (
-        BlockBench(Library, {"folder": str(folder / "controller")}, rate=500.0) as bench,
+        BlockBench(CLibrary, {"folder": str(folder / "controller")}, rate=500.0) as bench,
         pytest.raises(BlockError, match="a step of controller returns NOT_FINITE: a signal is NaN"),
     ):
         bench.set("wish", value=[1e308])
@@ -215,7 +215,7 @@ blocks:
     in: {command: controller.safety_command, push: push.push}
   push: {use: hal.Push, with: {force: 0 N}, in: {truth: robot.truth}}
   controller:
-    use: blocks.Library
+    use: blocks.CLibrary
     with: {folder: jumper}
     in: {robot_contacts: robot.contacts, robot_imu: robot.imu, robot_joints: robot.joints, robot_health: robot.health}
 """
@@ -293,7 +293,7 @@ def test_a_process_in_lockstep_gives_the_same_bytes(folder: Path, tmp_path: Path
         found = result.signal("controller.force.value")
         other = (
             "rate: 500 Hz\nduration: 0.1 s\nblocks:\n  force: {use: blocks.Constant, with: {value: [1 N]}}\n"
-            f"  plant: {{use: blocks.Library, with: {{folder: plant, memory: {memory}}}, in: {{force: force.y}}}}\n"
+            f"  plant: {{use: blocks.CLibrary, with: {{folder: plant, memory: {memory}}}, in: {{force: force.y}}}}\n"
         )
         with pytest.raises(AloftError, match=r"runs another library than plant"):
             aloft.load(other, path=folder / "g.yaml").run()

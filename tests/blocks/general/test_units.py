@@ -67,10 +67,10 @@ CASES = [
     ("Constant", "value: [1.0], unit: N m", "", "y", "N m"),
     ("Ramp", "slope: 1, unit: rad", "", "y", "rad"),
     ("SineWave", "frequency: 1, unit: rad", "", "y", "rad"),
-    ("Function", "function: abs", "u: s.m", "y", "m"),
-    ("Function", "function: square", "u: s.m", "y", "m^2"),
-    ("Function", "function: reciprocal", "u: s.m", "y", "1/m"),
-    ("Function", "function: negative", "u: s.m", "y", "m"),
+    ("Expression", "expression: abs(a)", "a: s.m", "y", "m"),
+    ("Expression", "expression: a ** 2", "a: s.m", "y", "m^2"),
+    ("Expression", "expression: 1 / a", "a: s.m", "y", "1/m"),
+    ("Expression", "expression: -round(a)", "a: s.m", "y", "m"),
 ]
 
 

@@ -1,10 +1,10 @@
-"""``blocks.Function``: every function, against Python's own."""
+"""``blocks.Expression``: every function, against Python's own, and its units; ``blocks.External``."""
 
 import math
 
 import pytest
 
-from aloft.blocks.general.user_code import TIME, Expression, External, Function, unit_of
+from aloft.blocks.general.user_code import TIME, Expression, External, unit_of
 from aloft.mathematics.elementwise import FUNCTIONS
 from aloft.mathematics.expression import parse_expression
 from aloft.runtime.language.errors import BlockError, UnitError
@@ -14,17 +14,14 @@ from aloft.runtime.testing import BlockBench
 OTHERS = {
     "abs": abs,
     "sign": lambda u: math.copysign(1.0, u),
-    "negative": lambda u: -u,
-    "reciprocal": lambda u: 1.0 / u,
-    "square": lambda u: u * u,
     "round": round,
 }
 
 
 @pytest.mark.parametrize("name", list(FUNCTIONS))
 def test_function(name: str) -> None:
-    bench = BlockBench(Function, {"n": 2, "function": name})
-    bench.set("u", value=[0.6, 0.25])
+    bench = BlockBench(Expression, {"n": 2, "expression": f"{name}(a)"}, wired=["a"])
+    bench.set("a", value=[0.6, 0.25])
     bench.step()
     function = OTHERS.get(name) or getattr(math, name)
     assert bench.get("y").value.tolist() == pytest.approx([function(0.6), function(0.25)])

@@ -9,7 +9,7 @@ import pytest
 
 from aloft.blocks.jumping.online_planner import OnlinePlanner
 from aloft.blocks.signals import PlanOutcome
-from aloft.blocks.signals.steering import PART_ROWS
+from aloft.blocks.signals.steering import SEGMENT_ROWS
 from aloft.planner.library.jump_table import COLUMNS
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
@@ -18,9 +18,9 @@ from aloft.runtime.testing import BlockBench
 def parts_of(bench: BlockBench[OnlinePlanner], number: int, **request: float):
     bench.set("request", number=number, **request)
     found = []
-    while not found or found[-1]["part"] + 1 < found[-1]["parts"]:
+    while not found or found[-1]["segment"] + 1 < found[-1]["segments"]:
         bench.step()
-        found.append({name: view.copy() for name, view in bench.get("part")})
+        found.append({name: view.copy() for name, view in bench.get("segment")})
         assert len(found) < 20
     return found
 
@@ -29,13 +29,13 @@ def parts_of(bench: BlockBench[OnlinePlanner], number: int, **request: float):
 def test_a_plan_comes_in_parts_and_repeats_to_the_byte() -> None:
     bench = BlockBench(OnlinePlanner, robot="bruce", rate=100.0)
     bench.step()
-    assert bench.get("part").number == 0
+    assert bench.get("segment").number == 0
     first = parts_of(bench, 1, ahead=0.12, aside=0.03, turn=0.2)
-    assert [int(part["part"]) for part in first] == list(range(len(first)))
-    assert all(int(part["outcome"]) == PlanOutcome.PLANNED for part in first)
-    time = np.concatenate([part["time"] for part in first])
-    assert (np.diff(time) >= 0.0).all() and len(time) == len(first) * PART_ROWS
-    rows = np.concatenate([part["rows"] for part in first])
+    assert [int(segment["segment"]) for segment in first] == list(range(len(first)))
+    assert all(int(segment["outcome"]) == PlanOutcome.PLANNED for segment in first)
+    time = np.concatenate([segment["time"] for segment in first])
+    assert (np.diff(time) >= 0.0).all() and len(time) == len(first) * SEGMENT_ROWS
+    rows = np.concatenate([segment["rows"] for segment in first])
     assert rows.shape[1] == 25 + 8 * 2 + 4 * 10
     # where the feet are in the end: their columns stand behind seven columns of three and one of four
     begin = 3 * 3 + 4 + 3 + 3 + 3 + 3
@@ -52,9 +52,9 @@ def test_a_plan_comes_in_parts_and_repeats_to_the_byte() -> None:
 @pytest.mark.long
 def test_a_jump_out_of_reach_is_replaced_by_the_nearest() -> None:
     bench = BlockBench(OnlinePlanner, robot="bruce", rate=100.0)
-    part = parts_of(bench, 1, ahead=0.8, aside=0.0, turn=0.0)[-1]
-    assert int(part["outcome"]) == PlanOutcome.NEAREST
-    assert float(part["ahead"]) == pytest.approx(0.32)
+    segment = parts_of(bench, 1, ahead=0.8, aside=0.0, turn=0.0)[-1]
+    assert int(segment["outcome"]) == PlanOutcome.NEAREST
+    assert float(segment["ahead"]) == pytest.approx(0.32)
     assert bench.block.metrics()["plans_nearest"] == 1
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from aloft.blocks.jumping.steered_plan import SteeredPlan
 from aloft.blocks.signals import Phase, PlanOutcome
-from aloft.blocks.signals.steering import PART_ROWS
+from aloft.blocks.signals.steering import SEGMENT_ROWS
 from aloft.planner.library.jump_table import table_rows
 from aloft.planner.online.hop_plans import hop_table, samples_of_hops
 from aloft.robots.description import find_robot
@@ -46,12 +46,12 @@ def hand_over(
     samples = samples_of_hops(find_robot("bruce"))
     table = hop_table(samples.plan(row), ROBOT)
     rows, n = table_rows(table).rows, len(table.time)
-    parts = -(-n // PART_ROWS)
+    parts = -(-n // SEGMENT_ROWS)
     ahead, aside, turn, up = samples.requests[row]
     for part in range(parts):
-        pick = np.minimum(np.arange(part * PART_ROWS, (part + 1) * PART_ROWS), n - 1)
+        pick = np.minimum(np.arange(part * SEGMENT_ROWS, (part + 1) * SEGMENT_ROWS), n - 1)
         bench.set(
-            "part", number=number, part=part, parts=parts, time=table.time[pick], rows=rows[pick],
+            "segment", number=number, segment=part, segments=parts, time=table.time[pick], rows=rows[pick],
             contact=table.contact[pick], marks=[table.squat_time, table.recover_time],
             jump=[table.thrust_time, table.lift_off_time, table.touchdown_time],
             outcome=outcome, ahead=ahead, aside=aside, turn=turn, up=up,

@@ -15,7 +15,7 @@ from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.simulated.plant import Plant
 from aloft.hal.simulated.state import PhysicsState, TickRecord
 from aloft.mathematics.arrays import Array, Indices
-from aloft.mathematics.compiling.library_call import LibraryCall
+from aloft.mathematics.compiling.foreign_call import ForeignCall
 from aloft.robots.description import RobotDescription, find_robot
 from aloft.runtime.testing.bench import BlockBench
 
@@ -38,13 +38,13 @@ class HoldingDrives:
 
     def torque_call(
         self, step: Indices, position: Array, velocity: Array, speed: Array, out: Array
-    ) -> LibraryCall:
+    ) -> ForeignCall:
         def write() -> None:
             self.steps.append(int(step))
             out[:] = self.torque + self.plant.stiffness * (self.position - position)
             out[:] -= self.plant.damping * velocity
 
-        return LibraryCall(write, 0)
+        return ForeignCall(write, 0)
 
 
 def plant_of(robot: RobotDescription, **params: object) -> Plant:

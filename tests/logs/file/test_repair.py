@@ -10,7 +10,7 @@ from aloft.blocks.general.sources import Constant
 from aloft.logs import RecordedRun, RecordingError, read
 from aloft.logs.file.header import make_header
 from aloft.logs.file.repair import RepairError, repair
-from aloft.logs.recording.place import part_of
+from aloft.logs.recording.output_file import unfinished_name
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
@@ -32,7 +32,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]]:
         rows = np.zeros((BATCH, size), np.uint8)
         rows[:, :8] = ticks.astype(np.float64)[:, None].view(np.uint8)
         writer.write_rows(ticks, rows)
-        sizes.append(part_of(path).stat().st_size)
+        sizes.append(unfinished_name(path).stat().st_size)
     writer.write_outcome({"run_hash": "", "reason": "over"})
     writer.close()
     return path, sizes

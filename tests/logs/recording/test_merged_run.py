@@ -17,7 +17,7 @@ from aloft.logs.recording.merged_run import (
 )
 from aloft.logs.recording.recorder import Recorder
 from aloft.runtime.language.errors import AloftError
-from aloft.runtime.placement.placed import PlacedGraph, place
+from aloft.runtime.placement.placed import PlacedGraph, split_over_machines
 from aloft.runtime.running.executor import run
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
@@ -35,7 +35,7 @@ Made = tuple[PlacedGraph, dict[str, Path], Path]
 def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
     """A graph, the recordings of its parts, and the recording of a run in one process."""
     folder = tmp_path_factory.mktemp("parts")
-    placed = place(ring(ticks=60))
+    placed = split_over_machines(ring(ticks=60))
     paths = {machine.name: folder / f"{machine.name}.rrd" for machine in placed.machines}
     run_parts_of(
         placed, Hub(),

@@ -14,7 +14,7 @@ import pytest
 from aloft.logs import read
 from aloft.logs.exporting.export import export
 from aloft.logs.recording import place as remedies
-from aloft.logs.recording.place import remedy
+from aloft.logs.recording.output_file import remedy
 from aloft.logs.recording.ring import ALIGNMENT, CONTROL, fitting_capacity
 
 GRAPH = """\

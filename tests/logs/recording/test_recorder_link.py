@@ -238,8 +238,8 @@ def test_a_process_ends_with_one_that_died_before_it_had_a_task() -> None:
 def test_the_process_imports_no_pandas_and_arrow_does_without() -> None:
     code = (
         "import sys\n"
-        "from aloft.logs.recording.recorder_process import WithoutPandas\n"
-        "sys.meta_path.insert(0, WithoutPandas())\n"
+        "from aloft.logs.recording.recorder_process import block_pandas_import\n"
+        "block_pandas_import()\n"
         "import pyarrow\n"
         "import rerun\n"
         "rerun.AnyValues(text='a', number=1.0).as_component_batches()\n"

@@ -132,7 +132,7 @@ def test_without_restoring_the_present_files_are_used(project: Path) -> None:
 def test_a_large_file_is_named_and_not_carried(
     project: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("aloft.logs.file.surroundings.MOST_CARRIED", 4)
+    monkeypatch.setattr("aloft.logs.file.dependencies.MOST_CARRIED", 4)
     record(load("graph.yaml"), project / "large.rrd")
     header = read(project / "large.rrd").header
     assert len(header.files) == 2

@@ -10,8 +10,8 @@ import pytest
 
 from aloft.mathematics.compiling.call_sequence import CallSequence
 from aloft.mathematics.compiling.compile_calls import compile_calls
+from aloft.mathematics.compiling.foreign_call import ForeignCall, address_of
 from aloft.mathematics.compiling.kernel_call import KernelCall
-from aloft.mathematics.compiling.library_call import LibraryCall, address_of
 
 from .kernels_for_tests import add_scaled, divide
 
@@ -19,8 +19,8 @@ MEMCPY = ctypes.CDLL(None).memcpy
 """The C function that copies bytes."""
 
 
-def copying(source: np.ndarray, target: np.ndarray) -> LibraryCall:
-    return LibraryCall(
+def copying(source: np.ndarray, target: np.ndarray) -> ForeignCall:
+    return ForeignCall(
         partial(np.copyto, target, source), address_of(MEMCPY), target.ctypes.data,
         source.ctypes.data, source.nbytes,
     )  # fmt: skip
@@ -60,7 +60,7 @@ def test_a_call_without_an_address_keeps_all_of_them_in_python() -> None:
     x = np.ones(3)
     adding = KernelCall(add_scaled, x, 0.1, x)
     assert not compile_calls([adding])
-    sequence = CallSequence([adding, LibraryCall(partial(seen.append, 1), 0)])
+    sequence = CallSequence([adding, ForeignCall(partial(seen.append, 1), 0)])
     sequence.prepare()
     assert not sequence.native
     sequence.run()
@@ -85,6 +85,6 @@ def test_an_error_of_a_kernel_is_raised_and_the_next_run_begins_anew() -> None:
 
 def test_a_function_gets_three_arguments_at_most() -> None:
     with pytest.raises(ValueError, match="gets 3 arguments, not 4"):
-        LibraryCall(lambda: None, 0, 1, 2, 3, 4)
+        ForeignCall(lambda: None, 0, 1, 2, 3, 4)
     with pytest.raises(ValueError, match="the address of the function is not known"):
-        _ = LibraryCall(lambda: None, 0).addresses
+        _ = ForeignCall(lambda: None, 0).addresses

@@ -173,38 +173,38 @@ def test_scalar_fields_read_and_are_assigned_like_numbers() -> None:
 
 @kernel
 def reads_its_target(R: Array2D, v: Array1D) -> None:
-    """Refused: R is applied to what is already overwritten."""
+    """NotCompilable: R is applied to what is already overwritten."""
     v[:] = R @ v
 
 
 @kernel
 def reads_another_part(v: Array1D) -> None:
-    """Refused: each element is read after it has been written."""
+    """NotCompilable: each element is read after it has been written."""
     v[1:3] = v[0:2]
 
 
 @kernel
 def makes_an_array(a: Array1D, out: Array1D) -> None:
-    """Refused: a sum of arrays needs room."""
+    """NotCompilable: a sum of arrays needs room."""
     both_of = a + out
     out[:] = both_of
 
 
 @kernel
 def does_not_fit(a: Array2D, out: Array1D) -> None:
-    """Refused: two dimensions in one."""
+    """NotCompilable: two dimensions in one."""
     out[:] = a
 
 
 @kernel
 def unknown_member(kind: int, out: Array1D) -> None:
-    """Refused: no such colour."""
+    """NotCompilable: no such colour."""
     out[0] = 1.0 if kind == Colour.GREEN else 0.0  # type: ignore[attr-defined]
 
 
 @kernel
 def unknown_field(body: Body, out: Array1D) -> None:
-    """Refused: no such field."""
+    """NotCompilable: no such field."""
     out[0] = body.speed  # type: ignore[attr-defined]
 
 

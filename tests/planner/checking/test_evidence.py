@@ -11,7 +11,7 @@ from aloft.planner.checking.evidence import (
     _gaps,
     body_heights,
     ground_height,
-    leg_lack,
+    leg_clearance_deficit,
     step_edge,
 )
 from aloft.planner.models.exact_dynamics import dynamics_of
@@ -106,7 +106,7 @@ def test_legs_lack_what_is_wanted_or_what_they_had_at_first(wanted: float) -> No
                    for chain in legs(robot))  # fmt: skip
     gaps = np.array([closest(left, right, k) for k in range(count)])
     assert np.ptp(gaps) > 0.02, "the legs come closer or go apart"
-    lack = leg_lack(robot, poses, wanted)
+    lack = leg_clearance_deficit(robot, poses, wanted)
     assert lack is not None
     # what is lacked of the nearest pair; pairs that were close at first may stay so
     assert np.all(lack >= np.minimum(wanted, gaps[0]) - gaps - 1e-3)

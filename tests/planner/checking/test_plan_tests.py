@@ -11,7 +11,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from aloft.blocks.signals import Phase
 from aloft.mathematics.constants import GRAVITY
 from aloft.planner.checking.evidence import Evidence, body_heights
 from aloft.planner.checking.plan_tests import (
@@ -28,6 +27,7 @@ from aloft.planner.checking.validity import PlanTest, check_plan
 from aloft.planner.library.library import SHIPPED
 from aloft.planner.models.exact_dynamics import ExactDynamics
 from aloft.planner.task.margins import Margins
+from aloft.planner.task.phase import Phase
 from aloft.planner.task.plan import PlannedJump, read_plan
 from aloft.robots.description import find_robot
 

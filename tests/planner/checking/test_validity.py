@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aloft.blocks.signals import Phase
 from aloft.planner.checking import validity
 from aloft.planner.checking.evidence import PlanTestResult
 from aloft.planner.checking.validity import (
@@ -17,6 +16,7 @@ from aloft.planner.checking.validity import (
     require_valid,
 )
 from aloft.planner.library.library import SHIPPED
+from aloft.planner.task.phase import Phase
 from aloft.planner.task.plan import PlannedJump, read_plan
 from aloft.robots.description import find_robot
 

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from aloft.blocks.signals import PlanOutcome
 from aloft.planner.checking.validity import require_valid
 from aloft.planner.online import correction
 from aloft.planner.online.hop_plans import samples_of_hops
 from aloft.planner.online.hop_request import HopRequest
 from aloft.planner.online.next_hop import HopPlanner
+from aloft.planner.online.plan_outcome import PlanOutcome
 from aloft.planner.task.plan import plan_bytes
 from aloft.robots.description import find_robot
 

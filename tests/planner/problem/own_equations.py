@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from aloft.blocks.signals import Phase
 from aloft.mathematics.arrays import Array
 from aloft.mathematics.constants import GRAVITY
 from aloft.mathematics.rotations import matrices_of_quaternions, multiply
 from aloft.planner.models.euler_angles import angular_motion, euler_angles, euler_rates, rotation
 from aloft.planner.models.exact_dynamics import ExactDynamics
+from aloft.planner.task.phase import Phase
 from aloft.planner.task.plan import PlannedJump
 from aloft.robots.description import RobotDescription
 

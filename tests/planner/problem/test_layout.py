@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from aloft.blocks.signals import Phase
 from aloft.planner.problem.layout import layout
+from aloft.planner.task.phase import Phase
 from aloft.planner.task.task import JumpTaskError, make_task
 from aloft.robots.description import find_robot
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from tests.robots.example_robots import needs_robots
 
-from aloft.blocks.signals import Phase
 from aloft.planner.library.library import solve_and_check
 from aloft.planner.models.coordinates import full_coordinates, sagittal_coordinates
 from aloft.planner.models.symbolic_model import SymbolicModel
@@ -20,6 +19,7 @@ from aloft.planner.problem.obstacles import (
     step_parameters,
 )
 from aloft.planner.solving.solve import make_problem
+from aloft.planner.task.phase import Phase
 from aloft.planner.task.read_task import edge_room
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
@@ -178,12 +178,12 @@ def test_all_but_the_feet_keeps_off_the_ground_on_ball_feet() -> None:
         task = make_task({"recipe": "paper", "name": "up", "robot": robot.name, "rise": 0.1})
         rows = ObstacleRows(model, coordinates)
         points = obstacle_points(model, coordinates)
-        for stretch in layout(task, robot):
-            found = rows.rows(task.hops()[0], None, stretch, False)
+        for problem_phase in layout(task, robot):
+            found = rows.rows(task.hops()[0], None, problem_phase, False)
             links = {points[row][1][0] for row in found}
             bodies = {link.name for link in robot.links if link.shapes}
-            expected = bodies if watched and not stretch.flies else set()
-            assert links == expected, stretch.phase
+            expected = bodies if watched and not problem_phase.flies else set()
+            assert links == expected, problem_phase.phase
 
 
 @pytest.mark.long
@@ -221,7 +221,7 @@ def test_a_base_on_legs_that_fold_stays_above_what_counts_as_a_fall() -> None:
         ).resolved(robot)
         problem = make_problem(task, robot, compiled=False)
         height = problem.coordinates.free_base.index(2)
-        lows = {problem.stretch_at(k).phase: problem.lower[problem.assembly.state_start[k] + height]
+        lows = {problem.phase_at(k).phase: problem.lower[problem.assembly.state_start[k] + height]
                 for k in range(2, problem.knots - 1)}  # fmt: skip
         least = fall_height(robot) + (task.margins.step if task.margins else 0.0)
         assert lows[Phase.FLIGHT] == -np.inf

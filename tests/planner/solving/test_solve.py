@@ -22,10 +22,10 @@ from aloft.planner.problem.guess import ballistic_guess
 from aloft.planner.problem.unpacking import can_start
 from aloft.planner.solving.solve import (
     asks_for_finer,
-    curable,
-    eased,
     finer_knots,
     make_problem,
+    relaxable,
+    relaxed,
     solve_jump,
     tighten,
     with_impacts,
@@ -187,7 +187,7 @@ TASK = make_task({"recipe": "paper", "name": "jump", "rise": 0.15, "distance_x":
 
 def test_only_the_motors_are_made_stronger() -> None:
     problem = make_problem(TASK, ROBOT)
-    stronger = eased(problem, 1.5)
+    stronger = relaxed(problem, 1.5)
     for k, family in enumerate(problem.families):
         factor = 1.5 if family.startswith("motor") else 1.0
         assert stronger.row_upper[k] == factor * problem.row_upper[k]
@@ -197,7 +197,7 @@ def test_only_the_motors_are_made_stronger() -> None:
 @pytest.mark.long
 def test_limits_come_down_to_the_real_ones() -> None:
     problem = make_problem(TASK, ROBOT)
-    easy = solve(eased(problem, 1.5), ballistic_guess(problem), solver="fatrop")
+    easy = solve(relaxed(problem, 1.5), ballistic_guess(problem), solver="fatrop")
     found = tighten(problem, easy.values, 1.5)
     assert found is not None
     assert found.solved
@@ -209,7 +209,7 @@ def test_limits_come_down_to_the_real_ones() -> None:
 @pytest.mark.long
 def test_limits_out_of_reach_are_not_reached() -> None:
     high = make_problem(make_task({"recipe": "paper", "name": "high", "rise": 0.45}), ROBOT)
-    easy = solve(eased(high, 2.0), ballistic_guess(high), solver="fatrop")
+    easy = solve(relaxed(high, 2.0), ballistic_guess(high), solver="fatrop")
     assert easy.solved
     assert tighten(high, easy.values, 2.0) is None
 
@@ -277,7 +277,7 @@ def failing(plan: PlannedJump, *tests: tuple[str, float, float]) -> PlannedJump:
 def test_what_finer_intervals_may_cure(
     by_hand: PlannedJump, tests: list[tuple[str, float, float]], expected: bool
 ) -> None:
-    assert curable(failing(by_hand, *tests)) is expected
+    assert relaxable(failing(by_hand, *tests)) is expected
 
 
 def test_only_a_failed_plan_of_that_very_task_asks_for_finer(by_hand: PlannedJump) -> None:

@@ -44,20 +44,20 @@ def test_sides_are_those_of_points_and_names_come_first() -> None:
 
 
 def test_feet_leave_and_land_one_after_the_other() -> None:
-    spans = task(
+    phase_specs = task(
         thrust_time="0.25 s",
         take_off={"FL": "80 ms", "RR": "80 ms", "FR": "30 ms"},
         touchdown={"hind": "60 ms"},
         landing_time="0.5 s",
-    ).spans()
-    assert [span.phase for span in spans] == [
+    ).phase_specs()
+    assert [phase_spec.phase for phase_spec in phase_specs] == [
         "squat", "thrust", "thrust", "thrust", "flight", "landing", "landing",
     ]  # fmt: skip
-    on = [[NAMES[k] for k in span.on_ground(GO2)] for span in spans]
+    on = [[NAMES[k] for k in phase_spec.on_ground(GO2)] for phase_spec in phase_specs]
     assert on[1:4] == [NAMES, ["FR", "RL"], ["RL"]]
     assert on[5:] == [["FL", "FR"], NAMES]
-    assert [span.time for span in spans[1:4]] == pytest.approx([0.17, 0.05, 0.03])
-    assert [span.time for span in spans[5:]] == pytest.approx([0.06, 0.44])
+    assert [phase_spec.time for phase_spec in phase_specs[1:4]] == pytest.approx([0.17, 0.05, 0.03])
+    assert [phase_spec.time for phase_spec in phase_specs[5:]] == pytest.approx([0.06, 0.44])
 
 
 def test_a_free_time_is_that_of_the_part_on_all_points() -> None:
@@ -66,9 +66,9 @@ def test_a_free_time_is_that_of_the_part_on_all_points() -> None:
 
 
 def test_in_a_row_feet_leave_in_turn_every_time() -> None:
-    spans = task(repeat=2, take_off={"fore": "60 ms"}).spans()
-    before = [k - 1 for k, span in enumerate(spans) if span.phase == "flight"]
-    assert [spans[k].raised for k in before] == [("fore",), ("fore",)]
+    phase_specs = task(repeat=2, take_off={"fore": "60 ms"}).phase_specs()
+    before = [k - 1 for k, phase_spec in enumerate(phase_specs) if phase_spec.phase == "flight"]
+    assert [phase_specs[k].raised for k in before] == [("fore",), ("fore",)]
 
 
 def test_a_plan_is_kept_under_the_same_hash_whether_or_not_feet_could_leave_in_turn() -> None:
@@ -111,6 +111,6 @@ def test_what_contradicts_itself_is_refused(values: dict[str, Any], text: str) -
 
 
 def test_raised_points_are_not_on_the_ground() -> None:
-    span = PhaseSpec(phase="thrust", contacts="left", raised=("fore",))
-    assert [NAMES[k] for k in span.on_ground(GO2)] == ["RL"]
+    phase_spec = PhaseSpec(phase="thrust", contacts="left", raised=("fore",))
+    assert [NAMES[k] for k in phase_spec.on_ground(GO2)] == ["RL"]
     assert PhaseSpec(phase="flight").on_ground(GO2) == ()

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aloft.blocks.signals import Phase
 from aloft.planner.checking.validity import check_plan
 from aloft.planner.solving.solve import solve_jump
 from aloft.planner.task.margins import Margins, joint_bounds, unknown_joints
+from aloft.planner.task.phase import Phase
 from aloft.planner.task.read_task import contradictions
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot

@@ -5,7 +5,7 @@ import math
 import pytest
 from tests.robots.limbed_robots import quadruped
 
-from aloft.planner.task.recipe import choices, demand
+from aloft.planner.task.recipe import choices, take_off_energy_ratio
 from aloft.planner.task.scaling import size_of
 from aloft.planner.task.task import JumpTask, make_task
 from aloft.robots.description import find_robot
@@ -22,12 +22,15 @@ def test_three_lines_are_the_whole_recipe() -> None:
     task = resolved()
     assert (task.impact, task.effort, task.profile) == (True, 0.85, "koala")
     assert (task.weights.force, task.weights.orientation, task.weights.impulse) == (0.01, 20.0, 5.0)
-    spans = [(span.phase, span.time, span.contacts) for span in task.spans()]
-    assert spans == [
+    phase_specs = [
+        (phase_spec.phase, phase_spec.time, phase_spec.contacts)
+        for phase_spec in task.phase_specs()
+    ]
+    assert phase_specs == [
         ("squat", 0.4, "all"), ("thrust", 0.21, "all"), ("thrust", 0.04, "toe"),
         ("flight", None, "all"), ("landing", 0.5, "all"),
     ]  # fmt: skip
-    assert task.spans()[2].knots == 8
+    assert task.phase_specs()[2].knots == 8
     assert task.margins is not None
     assert task.margins.landing_lean == 0.1
     assert task.margins.landing_limits == {"knee": (-2.1, -0.4)}
@@ -70,7 +73,7 @@ def test_no_margins_at_all_may_be_said() -> None:
 
 def test_the_times_that_are_said_are_those_of_the_phases() -> None:
     task = resolved(thrust_time=0.3, squat_time="free")
-    assert [span.time for span in task.spans()] == [None, 0.26, 0.04, None, 0.5]
+    assert [phase_spec.time for phase_spec in task.phase_specs()] == [None, 0.26, 0.04, None, 0.5]
     assert resolved(thrust_time="free").phases is None, "a free thrust is one on flat feet"
 
 
@@ -109,7 +112,9 @@ def test_more_is_spent_on_what_asks_for_more() -> None:
     efforts = [resolved(rise=rise, distance_x=0.0, twist=0.0).effort for rise in (0.1, 0.2, 0.3)]
     assert efforts[0] == 0.85 < efforts[1] < efforts[2] == 0.92
     low, high = ({"name": "a", "rise": rise, "landing_height": 0.05} for rise in (0.1, 0.2))
-    assert demand(make_task(low), BRUCE) < demand(make_task(high), BRUCE)
+    assert take_off_energy_ratio(make_task(low), BRUCE) < take_off_energy_ratio(
+        make_task(high), BRUCE
+    )
 
 
 def test_far_jumps_keep_the_torso_off_the_thighs() -> None:
@@ -153,7 +158,9 @@ def test_feet_clear_a_step_lower_than_their_share_by_its_height_alone() -> None:
 def test_heels_rise_first_where_the_ankles_can_thrust_on_the_toes() -> None:
     def contacts(robot: str) -> list[str]:
         task = make_task({"name": "a", "rise": 0.05}).resolved(find_robot(robot))
-        return [span.contacts for span in task.spans() if span.phase == "thrust"]
+        return [
+            phase_spec.contacts for phase_spec in task.phase_specs() if phase_spec.phase == "thrust"
+        ]
 
     assert contacts("bruce") == contacts("talos") == ["all", "toe"]
     assert contacts("g1") == ["all"]
@@ -191,7 +198,10 @@ def test_feet_come_down_slowly_except_from_very_high_up(
 def test_from_high_up_the_toes_land_first_with_all_of_the_motors() -> None:
     deep = {"rise": "8 cm", "distance_x": "25 cm", "twist": 0.0, "landing_height": "-35 cm"}
     task = resolved(**deep)
-    landing = [(span.phase, span.time, span.contacts) for span in task.spans()[-2:]]
+    landing = [
+        (phase_spec.phase, phase_spec.time, phase_spec.contacts)
+        for phase_spec in task.phase_specs()[-2:]
+    ]
     assert landing == [("landing", 0.04, "toe"), ("landing", 0.46, "all")]
     assert task.margins is not None
     assert (task.effort, task.margins.landing_effort) == (0.85, 1.0)
@@ -207,7 +217,7 @@ def test_toes_land_first_only_straight_ahead_from_a_height_they_can_bear(
 ) -> None:
     deep = {"rise": "8 cm", "distance_x": "25 cm", "twist": 0.0, "landing_height": "-35 cm"}
     task = resolved(**(deep | other))
-    assert task.spans()[-1].contacts == task.spans()[-2].contacts == "all"
+    assert task.phase_specs()[-1].contacts == task.phase_specs()[-2].contacts == "all"
     assert task.margins is None or task.margins.landing_effort is None
 
 
@@ -237,8 +247,10 @@ def test_balls_roll_on_and_knees_that_fold_keep_higher() -> None:
 
 
 def test_a_row_comes_to_balance_between_its_jumps_and_leaves_on_the_toes() -> None:
-    spans = make_task({"name": "a", "rise": "6 cm", "repeat": 2}).resolved(BRUCE).spans()
-    assert [(span.phase, span.time, span.contacts) for span in spans] == [
+    phase_specs = (
+        make_task({"name": "a", "rise": "6 cm", "repeat": 2}).resolved(BRUCE).phase_specs()
+    )
+    assert [(phase_spec.phase, phase_spec.time, phase_spec.contacts) for phase_spec in phase_specs] == [
         ("squat", 0.4, "all"), ("thrust", 0.21, "all"), ("thrust", 0.04, "toe"), ("flight", None, "all"),
         ("landing", 0.3, "all"), ("thrust", 0.26, "all"), ("thrust", 0.04, "toe"),
         ("flight", None, "all"), ("landing", 0.5, "all"),
@@ -247,8 +259,8 @@ def test_a_row_comes_to_balance_between_its_jumps_and_leaves_on_the_toes() -> No
 
 def test_the_time_on_the_ground_that_is_said_is_kept() -> None:
     said = make_task({"name": "a", "rise": "6 cm", "repeat": 2, "contact_time": "0.4 s"})
-    spans = said.resolved(BRUCE).spans()
-    assert [span.time for span in spans[4:7]] == [0.2, 0.16, 0.04]
+    phase_specs = said.resolved(BRUCE).phase_specs()
+    assert [phase_spec.time for phase_spec in phase_specs[4:7]] == [0.2, 0.16, 0.04]
     free = make_task({"name": "a", "rise": "6 cm", "repeat": 2, "contact_time": "free"})
     assert free.resolved(BRUCE).phases is None, "a free time is found on flat feet"
 
@@ -278,7 +290,7 @@ def test_a_deep_squat_takes_longer_with_more_load_on_the_ground(
 ) -> None:
     task = resolved(**{"rise": 0.1, "distance_x": 0.0, "twist": 0.0, **said})
     assert task.margins is not None
-    assert (task.spans()[0].time, task.margins.load) == (time, load)
+    assert (task.phase_specs()[0].time, task.margins.load) == (time, load)
 
 
 @pytest.mark.parametrize(("distance", "speed"), [(0.0, 1.7), (0.3, None)])

@@ -32,7 +32,12 @@ def test_a_jump_alone_is_one_of_a_row() -> None:
     one = task(rise=0.1, distance_x=0.05)
     assert one.hops() == (one.hops()[0],)
     assert (one.hops()[0].rise, one.hops()[0].distance_x) == (0.1, 0.05)
-    assert [span.phase for span in one.spans()] == ["squat", "thrust", "flight", "landing"]
+    assert [phase_spec.phase for phase_spec in one.phase_specs()] == [
+        "squat",
+        "thrust",
+        "flight",
+        "landing",
+    ]
 
 
 def test_jumps_take_from_the_task_what_they_do_not_say() -> None:
@@ -43,11 +48,19 @@ def test_jumps_take_from_the_task_what_they_do_not_say() -> None:
 
 
 def test_between_two_jumps_the_robot_lands_and_pushes_off() -> None:
-    spans = task(rise=0.1, repeat=2, contact_time="0.3 s").spans()
-    assert [span.phase for span in spans] == [
+    phase_specs = task(rise=0.1, repeat=2, contact_time="0.3 s").phase_specs()
+    assert [phase_spec.phase for phase_spec in phase_specs] == [
         "squat", "thrust", "flight", "landing", "thrust", "flight", "landing",
     ]  # fmt: skip
-    assert [span.time for span in spans] == [0.4, 0.25, None, 0.15, 0.15, None, 0.5]
+    assert [phase_spec.time for phase_spec in phase_specs] == [
+        0.4,
+        0.25,
+        None,
+        0.15,
+        0.15,
+        None,
+        0.5,
+    ]
 
 
 def test_places_add_up_and_edges_lie_between_them() -> None:
@@ -73,18 +86,18 @@ def test_times_may_be_free(name: str) -> None:
 
 def test_a_sequence_of_contacts() -> None:
     robot = find_robot("bruce")
-    spans = task(
+    phase_specs = task(
         rise=0.1, flight_time=0.3, phases=[
             {"phase": "thrust"},
             {"phase": "thrust", "time": "50 ms", "contacts": "toe", "knots": 5},
             {"phase": "flight"},
             {"phase": "landing", "time": 0.4},
         ],
-    ).spans()  # fmt: skip
-    assert [span.time for span in spans] == [None, 0.05, 0.3, 0.4]
-    assert [span.knots for span in spans] == [16, 5, 28, 14]
-    assert spans[1].on_ground(robot) == (0, 2)
-    assert spans[2].on_ground(robot) == ()
+    ).phase_specs()  # fmt: skip
+    assert [phase_spec.time for phase_spec in phase_specs] == [None, 0.05, 0.3, 0.4]
+    assert [phase_spec.knots for phase_spec in phase_specs] == [16, 5, 28, 14]
+    assert phase_specs[1].on_ground(robot) == (0, 2)
+    assert phase_specs[2].on_ground(robot) == ()
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from aloft.mathematics.rotations import matrices_of_quaternions
 from aloft.robots.description import find_robot, read
 from aloft.robots.importing.new_yaml import new_yaml
 from aloft.robots.importing.read_model import read_model
-from aloft.robots.robot_description import MountedSensorPart
+from aloft.robots.robot_description import SensorMount
 from aloft.tests.robots.importing.model_files import ONE_LEG
 
 SITES = ONE_LEG.replace(
@@ -116,6 +116,6 @@ def test_a_force_sensor_under_a_foot_is_one_and_others_are_named(tmp_path: Path)
 
 @pytest.mark.parametrize("wrong", [[0.0, 0.0, 0.0, 0.0], [float("inf"), 0.0, 0.0, 1.0]])
 def test_an_orientation_that_is_none_is_reported(wrong: list[float]) -> None:
-    part = MountedSensorPart.model_validate({"kind": "imu", "link": "base", "orientation": wrong})
+    part = SensorMount.model_validate({"kind": "imu", "link": "base", "orientation": wrong})
     with pytest.raises(SensorError, match="orientation is a quaternion"):
         Imu("head", part)

@@ -44,7 +44,7 @@ def survives(name: str, **files: str) -> None:
     try:
         found = read(folder() / name)
     except RobotError as error:
-        assert error.faults and all(fault.message for fault in error.faults)
+        assert error.errors and all(fault.message for fault in error.errors)
         assert str(error).splitlines()[0].startswith(str(folder()))
     else:
         assert found.description.total_mass > 0.0

@@ -10,8 +10,6 @@ from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 from aloft.ros2.node import NodeAddress, join
 from aloft.runtime.language.errors import MissingExtraError, need_extra
-from aloft.runtime.language.stages import MachineSpec
-from aloft.runtime.transports.zenoh_transport import ZenohTransport
 
 ROOT = Path(__file__).parents[3]
 
@@ -30,11 +28,7 @@ def test_planning_says_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def test_links_and_topics_say_what_they_need(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "zenoh", None)
-    transport = ZenohTransport("test", [MachineSpec("a", "tcp/127.0.0.1:1")])
-    for use in (lambda: transport.open("a", print), transport.observe):
-        with pytest.raises(MissingExtraError, match=r"link .* 'aloft-robotics\[machines\]'"):
-            use()
+def test_topics_say_what_they_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rosbags", None)
     with pytest.raises(MissingExtraError, match=r"topic of ROS 2 .* 'aloft-robotics\[ros2\]'"):
         join(NodeAddress("tcp/127.0.0.1:1", 0, "", "n"))

@@ -10,7 +10,12 @@ from aloft.runtime.language.stages import WATCHDOG, CheckedGraph, LinkPolicy, Li
 from aloft.runtime.links.command_watch import CommandWatch
 from aloft.runtime.links.part import BoundPart
 from aloft.runtime.loading import LoadError, load
-from aloft.runtime.placement.placed import MachineLink, command_sources, place, silence_limit
+from aloft.runtime.placement.placed import (
+    MachineLink,
+    command_sources,
+    silence_limit,
+    split_over_machines,
+)
 from aloft.runtime.testing.spread import run_spread
 from aloft.runtime.transports.hub import Hub
 
@@ -71,7 +76,7 @@ def test_simulated_actuators_are_watched_where_the_graph_says_so_and_real_ones_a
 
 
 def test_silence_counts_from_the_first_look_and_for_the_most_silent_link() -> None:
-    placed = place(watched(0.02))
+    placed = split_over_machines(watched(0.02))
     time = Time()
     (link,) = placed.received_by("onboard")
     box = Box(link)
@@ -91,7 +96,7 @@ def test_silence_counts_from_the_first_look_and_for_the_most_silent_link() -> No
 
 
 def test_a_part_without_watched_links_is_never_silent() -> None:
-    placed = place(watched(0.02))
+    placed = split_over_machines(watched(0.02))
     part = BoundPart(placed, "near", Hub().transport())
     assert part.watch.links == () and part.watch.heard() == 0 and not part.watch.complaint()
     assert part.clock.commands_heard() == 0 and part.clock.command_limit == 0.0

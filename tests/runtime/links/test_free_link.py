@@ -10,7 +10,7 @@ from aloft.runtime.language.stages import LinkPolicy
 from aloft.runtime.links.free_link import LatestReceiver, LinkHealth
 from aloft.runtime.links.message import MessageReader, MessageWriter
 from aloft.runtime.links.peers import ClockOffset
-from aloft.runtime.placement.placed import place
+from aloft.runtime.placement.placed import split_over_machines
 from aloft.runtime.running.memory import Memory
 
 from .example_graphs import ring
@@ -40,7 +40,7 @@ class Bench:
     """A link in virtual time: the two ends, the clock, and the bus on both sides."""
 
     def __init__(self, policy: LinkPolicy) -> None:
-        placed = place(ring())
+        placed = split_over_machines(ring())
         (self.link,) = [link for link in placed.links if link.source == "last"]
         self.here, self.there = Memory(placed.graph.blocks), Memory(placed.graph.blocks)
         self.peers = Peers()

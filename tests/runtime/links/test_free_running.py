@@ -12,7 +12,7 @@ from aloft.runtime.language.stages import CheckedGraph, ClockSpec, LinkPolicy, L
 from aloft.runtime.links.free_link import LatestReceiver
 from aloft.runtime.links.part import BoundPart, part_clock, run_part
 from aloft.runtime.loading.checking.parameters import adjust
-from aloft.runtime.placement.placed import place
+from aloft.runtime.placement.placed import split_over_machines
 from aloft.runtime.running.run_result import RunResult
 from aloft.runtime.testing.spread import run_spread
 from aloft.runtime.transports.hub import Hub
@@ -56,7 +56,7 @@ def test_values_go_round_and_nothing_is_lost() -> None:
 
 
 def test_every_part_is_paced() -> None:
-    placed = place(free())
+    placed = split_over_machines(free())
     hub = Hub()
     for machine in placed.machines:
         part = BoundPart(placed, machine.name, hub.transport())
@@ -122,7 +122,7 @@ def in_a_thread(part: BoundPart, results: dict[str, RunResult], name: str) -> th
 
 def test_a_part_that_is_started_again_joins_without_the_others_starting_again() -> None:
     Counter.LOG.clear()
-    placed = place(free(LinkPolicy(None, "hold"), ticks=20_000))
+    placed = split_over_machines(free(LinkPolicy(None, "hold"), ticks=20_000))
     hub = Hub()
     parts = {m.name: BoundPart(placed, m.name, hub.transport()) for m in placed.machines}
     results: dict[str, RunResult] = {}
@@ -151,7 +151,7 @@ def test_a_part_that_is_started_again_joins_without_the_others_starting_again() 
 @pytest.mark.long
 def test_a_part_with_actuators_does_not_join_by_itself() -> None:
     Counter.LOG.clear()
-    placed = place(free(LinkPolicy(None, "hold"), ticks=20_000))
+    placed = split_over_machines(free(LinkPolicy(None, "hold"), ticks=20_000))
     hub = Hub()
     parts = {m.name: BoundPart(placed, m.name, hub.transport()) for m in placed.machines}
     results: dict[str, RunResult] = {}

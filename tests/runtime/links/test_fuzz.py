@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aloft.runtime.links.peers import PeerStates
-from aloft.runtime.placement.placed import place
+from aloft.runtime.placement.placed import split_over_machines
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_spread
 from aloft.runtime.transports.hub import Hub
@@ -36,7 +36,7 @@ BEACON = st.fixed_dictionaries(
 @settings(max_examples=300, deadline=None)
 @given(st.binary(max_size=200) | BEACON.map(lambda state: json.dumps(state).encode()))
 def test_no_beacon_raises(data: bytes) -> None:
-    placed = place(ring())
+    placed = split_over_machines(ring())
     peers = PeerStates(placed, "onboard", Hub().transport(), lambda: None)
     peers._on_beacon(data)
     peers._on_beacon(data)
@@ -44,7 +44,7 @@ def test_no_beacon_raises(data: bytes) -> None:
 
 
 def test_beacons_as_deep_as_a_parser_goes() -> None:
-    peers = PeerStates(place(ring()), "onboard", Hub().transport(), lambda: None)
+    peers = PeerStates(split_over_machines(ring()), "onboard", Hub().transport(), lambda: None)
     peers._on_beacon(b"[" * 100_000)
     peers._on_beacon(b'{"machine":"far","run":"' + b"00" * 8 + b'","phase":1e999,"checked":[]}')
     assert peers.run_of("far") is None

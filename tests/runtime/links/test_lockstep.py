@@ -14,7 +14,7 @@ from aloft.runtime.language.errors import AloftError, ExitCode
 from aloft.runtime.links.part import BoundPart
 from aloft.runtime.loading import load
 from aloft.runtime.loading.checking.parameters import adjust
-from aloft.runtime.placement.placed import place, spread
+from aloft.runtime.placement.placed import split_over_machines, spread
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_spread
 from aloft.runtime.transports.hub import Hub
@@ -45,7 +45,7 @@ def test_the_random_graphs_go_forth_and_back_within_a_tick() -> None:
         graph = random_graph(np.random.default_rng(seed))
         machines = [graph.block(path).machine for path in graph.order]
         blocks = {spec.path: spec for spec in graph.blocks}
-        links = place(graph).links
+        links = split_over_machines(graph).links
         assert links
         for path, machine in zip(graph.order, machines, strict=True):
             for wire in blocks[path].wires.values():

@@ -15,7 +15,7 @@ from aloft.runtime.links.message import (
     spans_of,
 )
 from aloft.runtime.loading import load
-from aloft.runtime.placement.placed import MachineLink, PlacedGraph, place
+from aloft.runtime.placement.placed import MachineLink, PlacedGraph, split_over_machines
 from aloft.runtime.running.memory import Memory
 
 RUN = b"12345678"
@@ -23,7 +23,9 @@ RUN = b"12345678"
 
 @pytest.fixture(scope="module")
 def placed() -> PlacedGraph:
-    return place(load(Path(__file__).parents[3] / "graphs" / "machines" / "jump_two.yaml"))
+    return split_over_machines(
+        load(Path(__file__).parents[3] / "graphs" / "machines" / "jump_two.yaml")
+    )
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ import pytest
 from aloft.runtime.language.stages import LinkPolicy, LinkSettings, MachineSpec
 from aloft.runtime.links.observer import ROW_HEADER, Observer, StatusPublisher, read_row
 from aloft.runtime.links.part import BoundPart, run_part
-from aloft.runtime.placement.placed import PlacedGraph, place, spread
+from aloft.runtime.placement.placed import PlacedGraph, split_over_machines, spread
 from aloft.runtime.running.run_result import RunResult
 from aloft.runtime.transports.keys import make_keys, secured
 from aloft.runtime.transports.zenoh_transport import ZenohTransport
@@ -62,7 +62,7 @@ def placed_at(protocol: str) -> PlacedGraph:
     machines = tuple(
         MachineSpec(spec.name, f"{protocol}/127.0.0.1:{free_port()}") for spec in graph.machines
     )
-    return place(replace(graph, machines=machines))
+    return split_over_machines(replace(graph, machines=machines))
 
 
 @pytest.fixture
@@ -109,7 +109,9 @@ def test_late_results_of_a_background_block_are_shown(stack: ExitStack) -> None:
     )  # fmt: skip
     machines = {name: f"tcp/127.0.0.1:{free_port()}" for name in ("control", "thinking")}
     graph = spread(background, machines, {"block": "thinking"})
-    placed = place(replace(graph, links=LinkSettings("free", LinkPolicy(60.0, "hold"))))
+    placed = split_over_machines(
+        replace(graph, links=LinkSettings("free", LinkPolicy(60.0, "hold")))
+    )
     observer = stack.enter_context(Observer(placed))
     running = Running(placed)
     stack.callback(running.end)
@@ -138,7 +140,7 @@ class Bench:
     """An observer without a session, to which bytes are given."""
 
     def __init__(self) -> None:
-        self.placed = place(free())
+        self.placed = split_over_machines(free())
         self.observer = Observer(self.placed)
 
 
@@ -169,7 +171,7 @@ def test_rows_are_checked() -> None:
 
 
 def test_a_transport_that_fails_hinders_nothing() -> None:
-    placed = place(free())
+    placed = split_over_machines(free())
 
     class Broken:
         is_open = True

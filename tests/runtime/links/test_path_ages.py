@@ -16,7 +16,7 @@ from aloft.runtime.language.errors import ExitCode
 from aloft.runtime.language.stages import CheckedGraph, LinkPolicy
 from aloft.runtime.links.path_ages import NAME, check_path_ages, path_sinks, timeline_of
 from aloft.runtime.loading import load_text
-from aloft.runtime.placement.placed import place
+from aloft.runtime.placement.placed import split_over_machines
 from aloft.runtime.running.executor import run
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing.spread import run_parts_of, run_spread
@@ -123,7 +123,7 @@ def test_parts_that_run_free_are_followed_through_their_links() -> None:
 
 
 def made(folder: Path, limit: float, interfere: Any = None) -> tuple[Any, Any]:
-    placed = place(free_with_path(limit, ticks=240))
+    placed = split_over_machines(free_with_path(limit, ticks=240))
     hub = Hub()
     hub.interfere = interfere
     files = {machine.name: folder / f"{machine.name}.rrd" for machine in placed.machines}

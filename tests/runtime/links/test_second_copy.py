@@ -9,7 +9,7 @@ from aloft.runtime.language.errors import ExitCode
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.links import peers
 from aloft.runtime.links.part import BoundPart
-from aloft.runtime.placement.placed import place
+from aloft.runtime.placement.placed import split_over_machines
 from aloft.runtime.running.run_result import RunResult
 from aloft.runtime.transports.zenoh_transport import ZenohTransport
 
@@ -29,7 +29,7 @@ def test_the_run_goes_on_and_the_newcomer_says_why(
     graph: Callable[[], CheckedGraph], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(peers, "REFUSED_FOR", 0.5)
-    placed = place(graph())
+    placed = split_over_machines(graph())
     machines = [replace(m, endpoint=f"tcp/127.0.0.1:{free_port()}") for m in placed.machines]
     # at an endpoint of its own: at the same one it could not even listen
     elsewhere = [replace(m, endpoint=f"tcp/127.0.0.1:{free_port()}") if m.name == "far" else m

@@ -10,7 +10,7 @@ from aloft import BlockError
 from aloft.runtime.language.errors import ExitCode
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.links.part import BoundPart, part_graph, run_part
-from aloft.runtime.placement.placed import place
+from aloft.runtime.placement.placed import split_over_machines
 from aloft.runtime.running.run_result import RunResult
 from aloft.runtime.testing.spread import run_spread
 from aloft.runtime.transports.hub import Hub
@@ -24,7 +24,9 @@ def run_parts(graphs: Mapping[str, CheckedGraph], timeout: float = 60.0) -> dict
     results: dict[str, RunResult] = {}
 
     def run(machine: str) -> None:
-        part = BoundPart(place(graphs[machine]), machine, hub.transport(), connect_timeout=timeout)
+        part = BoundPart(
+            split_over_machines(graphs[machine]), machine, hub.transport(), connect_timeout=timeout
+        )
         results[machine] = run_part(part)
 
     threads = [threading.Thread(target=run, args=(machine,), daemon=True) for machine in graphs]
@@ -108,10 +110,10 @@ def test_motors_are_enabled_last_and_damped_first() -> None:
 
 
 def test_the_graph_of_a_part() -> None:
-    graph = part_graph(place(ring()), "near")
+    graph = part_graph(split_over_machines(ring()), "near")
     # what is received is waited for right before it is read, and sent on at once
     assert graph.order == ("robot", "first", "first~to~far", "~coordinator")
-    assert part_graph(place(ring()), "onboard").order == (
+    assert part_graph(split_over_machines(ring()), "onboard").order == (
         "robot", "robot~to~near", "last", "~coordinator",
     )  # fmt: skip
     kinds: dict[str, Any] = {spec.path: spec.block_type.__name__ for spec in graph.blocks}

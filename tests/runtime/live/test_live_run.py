@@ -17,7 +17,7 @@ from aloft.runtime.live.parameter_endpoint import EndpointError, ask_to_watch
 from aloft.runtime.live.texts import ValueTexts
 from aloft.runtime.live.window import digest
 from aloft.runtime.loading import load_text
-from aloft.runtime.placement.placed import place
+from aloft.runtime.placement.placed import split_over_machines
 from aloft.runtime.running.memory import Memory
 
 from .conftest import Running, start
@@ -132,7 +132,7 @@ def test_blocks_that_have_changed_since(running: Running, monkeypatch: pytest.Mo
 
 def test_of_a_part_only_what_it_knows_is_shown() -> None:
     graph = load_text(MACHINES, "spread.yaml")
-    placed = place(graph)
+    placed = split_over_machines(graph)
     known = {"onboard": ["last", "twice", "wave"], "ground": ["twice", "wave"]}
     for machine, expected in known.items():
         part = part_graph(placed, machine)

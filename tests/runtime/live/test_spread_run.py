@@ -20,7 +20,7 @@ from aloft.runtime.live.part_feed import packed
 from aloft.runtime.live.spread_run import SpreadRun
 from aloft.runtime.live.window import WindowLayout
 from aloft.runtime.loading import load
-from aloft.runtime.placement.placed import PlacedGraph, place
+from aloft.runtime.placement.placed import PlacedGraph, split_over_machines
 
 from ...logs.viewing.browser import PROGRAM, Browser
 from ...waiting import free_port
@@ -64,7 +64,7 @@ def parts(graph: Path) -> Iterator[dict[str, subprocess.Popen[bytes]]]:
 
 @pytest.fixture
 def run(graph: Path) -> Iterator[SpreadRun]:
-    made = SpreadRun(place(load(graph)))
+    made = SpreadRun(split_over_machines(load(graph)))
     yield made
     made.close()
 
@@ -127,9 +127,9 @@ def ticks(found: dict[str, Any]) -> list[int]:
 
 
 def test_a_run_that_is_started_anew_at_other_endpoints_is_followed(graph: Path) -> None:
-    first = place(load(graph))
+    first = split_over_machines(load(graph))
     moved = [f"machines.{name}=tcp/127.0.0.1:{free_port()}" for name in ("near", "far")]
-    second = place(load(graph, moved))
+    second = split_over_machines(load(graph, moved))
     there: list[PlacedGraph | None] = [None]
     run = SpreadRun(first, find=lambda: there[0])
     try:

@@ -176,7 +176,7 @@ def test_a_ring_that_nothing_enters_must_not_contradict_itself(tmp_path: Path) -
             "y: {use: blocks.Product, with: {operation: divide}, in: {a: s.m, b: s.m}}",
             "1 in body",
         ),
-        ("y: {use: blocks.Function, with: {function: square}, in: {u: s.m}}", "m^2 in body"),
+        ("y: {use: blocks.Expression, with: {expression: a ** 2}, in: {a: s.m}}", "m^2 in body"),
         ("y: {use: blocks.Gain, with: {gain: 60 N/m}, in: {u: s.m}}", "N in body"),
         ("y: {use: blocks.MatrixGain, with: {matrix: [[2 N/m]]}, in: {u: s.m}}", "N"),
         (
@@ -195,16 +195,16 @@ def test_what_blocks_make_of_units(tmp_path: Path, blocks: str, unit: str) -> No
     assert str(graph.block("y").quantities["y.value"]) == unit
 
 
-def test_mistakes_in_formulas_and_functions(tmp_path: Path) -> None:
-    found = one(tmp_path, "  y: {use: blocks.Function, with: {function: sin}, in: {u: s.m}}\n")
-    assert found.message == "y.u is in m in body: sin takes angles in rad"
-    assert found.expected == "rad"
-    found = one(tmp_path, "  y: {use: blocks.Function, with: {function: sqrt}, in: {u: s.m}}\n")
-    assert found.message == "y.u is in m in body: the square root of m has no unit"
-    found = one(
-        tmp_path, "  y: {use: blocks.Expression, with: {expression: a + t}, in: {a: s.m}}\n"
-    )
-    assert found.message == "y.a is in m in body: in 'a + t' a is in m and t in s"
+def test_mistakes_in_formulas(tmp_path: Path) -> None:
+    for formula, mistake in (
+        ("sin(a)", "sin takes rad, not m"),
+        ("sqrt(a)", "the square root of m has no unit"),
+        ("a + t", "a is in m and t in s"),
+    ):
+        block = (
+            f"  y: {{use: blocks.Expression, with: {{expression: {formula}}}, in: {{a: s.m}}}}\n"
+        )
+        assert one(tmp_path, block).message == f"y.a is in m in body: in '{formula}' {mistake}"
 
 
 def test_vectors_are_turned_from_the_frame_they_are_in(tmp_path: Path) -> None:

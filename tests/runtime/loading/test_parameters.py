@@ -49,7 +49,7 @@ def test_entries_have_everything_but_what_loading_inserted(graph: BoundGraph) ->
 def test_mistakes_read_as_they_do_at_load(graph: BoundGraph) -> None:
     text = report(graph, "contacts.hold=-1", "contacts.hodl=1", "gian.gain=3", "wave.frequency=2 m")
     assert "--set contacts.hold=-1: bad-parameter: contacts.hold cannot be -1" in text
-    assert "at least 0 s (how long a point stays active after its switch opens)" in text
+    assert "at least 0 s (time for which a point stays active after its switch opens)" in text
     assert "no parameter 'hodl'" in text and "nearest    hold" in text
     assert "there is no block 'gian' in the running graph" in text and "nearest    gain" in text
     assert "wave.frequency cannot be 2 m" in text

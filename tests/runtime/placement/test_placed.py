@@ -10,8 +10,8 @@ from aloft.runtime.placement.placed import (
     PlacementError,
     link_rows,
     machine_rows,
-    place,
     placement_json,
+    split_over_machines,
     spread,
 )
 
@@ -50,7 +50,7 @@ def test_a_graph_without_machines_is_placed_nowhere() -> None:
     graph = load_text("rate: 1\nblocks:\n  a: {use: blocks.Constant, with: {value: [1]}}", PATH)
     assert graph.machines == () and graph.blocks[0].machine == ""
     with pytest.raises(PlacementError, match="names no machines; give it"):
-        place(graph)
+        split_over_machines(graph)
 
 
 def test_place_wins_over_on_and_names_whole_subgraphs(tmp_path: Path) -> None:
@@ -102,7 +102,7 @@ blocks:
 
 
 def test_links_carry_only_what_is_read_elsewhere() -> None:
-    placed = place(load_text(HEAD + BLOCKS, PATH))
+    placed = split_over_machines(load_text(HEAD + BLOCKS, PATH))
     assert [(link.name, link.rate_hz, link.payload, link.readers) for link in placed.links] == [
         ("wish@onboard -> ground", 50.0, 8, ("error.a",)),
         ("controller@ground -> onboard", 100.0, 8, ("position.u",)),
@@ -116,7 +116,7 @@ def test_links_carry_only_what_is_read_elsewhere() -> None:
 
 def test_a_shipped_controller_is_spread_by_an_overlay() -> None:
     shipped = Path(__file__).parents[3] / "graphs"
-    placed = place(load(shipped / "machines" / "jump_two.yaml"))
+    placed = split_over_machines(load(shipped / "machines" / "jump_two.yaml"))
     alone = load(shipped / "jump.yaml")
     assert placed.graph.order == alone.order
     assert [spec.path for spec in placed.graph.blocks] == [spec.path for spec in alone.blocks]
@@ -127,7 +127,7 @@ def test_a_shipped_controller_is_spread_by_an_overlay() -> None:
 
 
 def test_an_unknown_machine() -> None:
-    placed = place(load_text(HEAD + BLOCKS, PATH))
+    placed = split_over_machines(load_text(HEAD + BLOCKS, PATH))
     assert placed.machine("ground").endpoint == "tcp/127.0.0.1:7451"
     with pytest.raises(PlacementError, match="has no machine 'air'; it has onboard, ground"):
         placed.machine("air")
@@ -146,7 +146,7 @@ def test_spread() -> None:
 
 
 def test_printed() -> None:
-    placed = place(load_text(HEAD + BLOCKS, PATH))
+    placed = split_over_machines(load_text(HEAD + BLOCKS, PATH))
     assert machine_rows(placed) == [
         ("onboard", "tcp/127.0.0.1:7450", "wish, position", "2 links, 1.2 kB/s", "1 link, 0.8 kB/s"),
         ("ground", "tcp/127.0.0.1:7451", "error, controller", "1 link, 0.8 kB/s", "2 links, 1.2 kB/s"),

@@ -8,7 +8,14 @@ import pytest
 
 from aloft.runtime.graph import load
 from aloft.runtime.language.errors import BlockError, RunError
-from aloft.runtime.running.failures import Hang, blame, describe, locate, place_of, place_of_frames
+from aloft.runtime.running.failures import (
+    Hang,
+    blame,
+    describe,
+    locate,
+    location_of,
+    location_of_frames,
+)
 
 
 def line() -> int:
@@ -39,11 +46,11 @@ def test_an_error_inside_a_library_is_placed_where_it_was_called() -> None:
     error, at = raised()
     frames = traceback.extract_tb(error.__traceback__)
     assert "site-packages" in frames[-1].filename, "it was raised inside NumPy"
-    assert place_of(error) == f"{__file__}:{at}"
+    assert location_of(error) == f"{__file__}:{at}"
     # where nothing is the user's, the innermost statement of all
     inside = traceback.StackSummary.from_list(frames[1:])
-    assert place_of_frames(inside) == f"{frames[-1].filename}:{frames[-1].lineno}"
-    assert place_of_frames(traceback.StackSummary()) == "" and place_of(ValueError()) == ""
+    assert location_of_frames(inside) == f"{frames[-1].filename}:{frames[-1].lineno}"
+    assert location_of_frames(traceback.StackSummary()) == "" and location_of(ValueError()) == ""
 
 
 def test_a_place_and_a_traceback_are_noted_once() -> None:

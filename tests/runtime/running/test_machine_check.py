@@ -57,12 +57,12 @@ def test_what_the_system_lacks_is_said_with_its_package() -> None:
     def load(name: str) -> None:
         if name == "pinocchio":
             raise ImportError("libgomp.so.1: cannot open shared object file: No such file")
-        if name in ("daqp", "zenoh"):
+        if name in ("daqp", "casadi"):
             raise ModuleNotFoundError(f"No module named '{name}'")
 
     finding = examine_libraries(load)
     assert not finding.good
     assert "pinocchio cannot be loaded: libgomp.so.1: cannot open shared object" in finding.found
     assert "daqp cannot be loaded: No module named 'daqp'" in finding.found
-    assert "zenoh" not in finding.found, "an extra may be missing"
+    assert "casadi" not in finding.found, "an extra may be missing"
     assert finding.change == "`apt install libgomp1`, `pip install --force-reinstall daqp`"

@@ -13,9 +13,9 @@ from aloft.runtime.running.run_result import ExitCode, RunResult, merge_metrics
 
 
 def test_names_of_several_blocks_are_told_apart() -> None:
-    merged, failure, praise = merge_metrics({"a": {"x": 1, "y": 2}, "b": {"x": 3}, "c": {}})
+    merged, failure, success_reason = merge_metrics({"a": {"x": 1, "y": 2}, "b": {"x": 3}, "c": {}})
     assert merged == {"a.x": 1, "b.x": 3, "y": 2}
-    assert failure is None and praise is None
+    assert failure is None and success_reason is None
 
 
 def test_the_first_block_that_judges_without_success_gives_the_reason() -> None:
@@ -25,8 +25,8 @@ def test_the_first_block_that_judges_without_success_gives_the_reason() -> None:
         "bad": {"success": False, "reason": "it fell"},
         "worse": {"success": False},
     }
-    merged, failure, praise = merge_metrics(blocks)
-    assert (failure, praise) == ("it fell", "it stands")
+    merged, failure, success_reason = merge_metrics(blocks)
+    assert (failure, success_reason) == ("it fell", "it stands")
     assert list(merged) == ["tilt", "speed"], "those of blocks that judge come first"
     assert merge_metrics({"worse": {"success": False}})[1] == "block 'worse' reports no success"
     assert merge_metrics({"quiet": {"success": True}})[1:] == (None, None)

@@ -14,7 +14,7 @@ import pytest
 
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.stages import MachineSpec
-from aloft.runtime.placement.placed import PlacedGraph, place
+from aloft.runtime.placement.placed import PlacedGraph, split_over_machines
 from aloft.runtime.transports.keys import (
     AUTHORITY_KEY,
     KEY,
@@ -46,7 +46,7 @@ def placed_with_tls() -> PlacedGraph:
     machines = tuple(
         MachineSpec(spec.name, f"tls/127.0.0.1:{free_port()}") for spec in graph.machines
     )
-    return place(replace(graph, machines=machines))
+    return split_over_machines(replace(graph, machines=machines))
 
 
 @pytest.fixture(scope="module")
@@ -255,7 +255,7 @@ def test_what_is_there_is_kept_until_it_no_longer_fits(tmp_path: Path) -> None:
         replace(spec, endpoint="tls/robot.local:7450") if spec.name == "far" else spec
         for spec in placed.machines
     )
-    there = place(replace(placed.graph, machines=moved))
+    there = split_over_machines(replace(placed.graph, machines=moved))
     assert make_keys(there, tmp_path) == ["far"]  # its address is in its certificate
     assert make_keys(there, tmp_path, anew=True) == ["onboard", "near", "far"]
     (tmp_path / AUTHORITY_KEY).write_text("nonsense")
@@ -266,7 +266,7 @@ def test_what_is_there_is_kept_until_it_no_longer_fits(tmp_path: Path) -> None:
 def test_errors_say_what_to_do(keys: tuple[PlacedGraph, Path], tmp_path: Path) -> None:
     placed, folder = keys
     with pytest.raises(AloftError, match=r"write machines: \{onboard: tls/127.0.0.1:7450\}"):
-        make_keys(place(ring()), tmp_path)
+        make_keys(split_over_machines(ring()), tmp_path)
     with pytest.raises(AloftError, match="'far' cannot be an observer: the name is used already"):
         make_keys(placed, tmp_path, ["far"])
     with pytest.raises(AloftError, match="cannot name an observer"):
@@ -281,5 +281,5 @@ def test_errors_say_what_to_do(keys: tuple[PlacedGraph, Path], tmp_path: Path) -
         ),
     )
     with pytest.raises(AloftError, match="was made for another graph than"):
-        secured(place(graph), folder, "far")
+        secured(split_over_machines(graph), folder, "far")
     assert host_of("tls/[::1]:7450") == "::1" and host_of("tls/robot.local:7450") == "robot.local"

@@ -22,14 +22,14 @@ from .quantities import InputQuantities, OutputQuantities
 from .random_stream import RandomStream, StreamState, normal_call, uniform_call
 from .signals import Field, Signal
 
-FaultKind = Literal[
+SignalErrorKind = Literal[
     "stuck", "lost", "delayed", "biased", "drifting", "noisy", "scaled", "flipped", "chirp",
 ]  # fmt: skip
 FOLDER = "faults/"
-"""What the paths of faults begin with."""
-HOLDING: tuple[FaultKind, ...] = ("stuck", "lost", "delayed")
+"""Prefix of the paths of faults."""
+HOLDING: tuple[SignalErrorKind, ...] = ("stuck", "lost", "delayed")
 """The kinds that give an earlier value, of any type; those beside ``flipped`` compute with numbers."""
-OPTIONS: dict[FaultKind, dict[str, bool]] = {
+OPTIONS: dict[SignalErrorKind, dict[str, bool]] = {
     "stuck": {"value": False},
     "lost": {"share": False},
     "delayed": {"delay": True},
@@ -43,10 +43,10 @@ OPTIONS: dict[FaultKind, dict[str, bool]] = {
 """The parameters that a kind has beside when it is there, and whether it needs them."""
 
 
-class FaultParameters(Parameters):
-    """What goes wrong, and when."""
+class SignalErrorParameters(Parameters):
+    """Kind, size and time of a fault."""
 
-    kind: FaultKind = parameter(text="what goes wrong")
+    kind: SignalErrorKind = parameter(text="what goes wrong")
     start: float = parameter(
         0.0, unit="s", ge=0, text="when it begins: after the start of the run, or after its event"
     )
@@ -74,15 +74,15 @@ class FaultParameters(Parameters):
     seed: int = parameter(0, ge=0, text="of the random stream")
 
 
-class FaultState(Signal):
-    """Whether a fault is there."""
+class SignalErrorState(Signal):
+    """State of a fault: present or not."""
 
     active = Field(dtype="bool", text="whether it is there in this run")
     age = Field(unit="s", text="since when; zero before")
 
 
-class FaultMemory(Signal):
-    """How far a fault is."""
+class SignalErrorMemory(Signal):
+    """Progress of a fault."""
 
     runs = Field(dtype="int64", text="runs since its event, or since the start; -1 before")
     happened = Field(dtype="bool", text="whether its event was")
@@ -90,8 +90,8 @@ class FaultMemory(Signal):
     filled = Field(dtype="bool", text="whether earlier values are known")
 
 
-class FaultTiming(NamedTuple):
-    """When a fault is there: from ``start`` to ``end`` [s], in a ``share`` of the runs, which take
+class SignalErrorTiming(NamedTuple):
+    """Time of a fault: from ``start`` to ``end`` [s], in a ``share`` of the runs, which take
     ``period`` [s] each. With an ``event`` the time counts from when ``compared`` holds first."""
 
     start: float
@@ -116,7 +116,7 @@ CONDITION = re.compile(r"\s*(?P<name>\S+?)\s*(?P<sign>==|!=|<=|>=|<|>)\s*(?P<val
 
 @kernel
 def notice_event(value: Array, condition: Comparison, happened: Flags) -> None:
-    """Whether the condition holds for a value of any type (1,) now, or did before."""
+    """Set ``happened`` if the condition holds for a value of any type (1,), now or before."""
     number, wanted = float(value[0]), condition.number
     holds = (
         (condition.sign == 0 and number == wanted)
@@ -130,11 +130,12 @@ def notice_event(value: Array, condition: Comparison, happened: Flags) -> None:
 
 
 @kernel
-def time_fault(
-    timing: FaultTiming, tick: Indices, happened: Flags, draw: Array, runs: Indices, began: Indices,
+def time_signal_error(
+    timing: SignalErrorTiming, tick: Indices, happened: Flags, draw: Array, runs: Indices, began: Indices,
     active: Flags, age: Array, acts: Flags,
 ) -> None:  # fmt: skip
-    """Whether a fault is there, since when, and whether it acts in this run; ``draw`` is between 0 and 1."""
+    """Decide whether a fault is present, since when, and whether it acts in this run; ``draw`` is
+    between 0 and 1."""
     if runs[()] >= 0 or happened[0] or not timing.event:
         runs[()] = runs[()] + 1
     elapsed = timing.period * runs[()]
@@ -148,7 +149,8 @@ def time_fault(
 
 @kernel
 def fill_ring(values: Octets, ring: Octets, filled: Flags) -> None:
-    """In the first run: the entries (k, n) before it were as the ``values`` (1, n) are now."""
+    """Fill the ring in the first run: the entries (k, n) before it equal the ``values`` (1, n) of
+    now."""
     if not filled[()]:
         for entry in range(ring.shape[0]):
             for i in range(ring.shape[1]):
@@ -202,7 +204,8 @@ LINES = 40
 
 
 def chirp_lines(low: float, high: float, period: float) -> Array:
-    """The frequencies of a chirp [Hz]: multiples of 1 / period from low to high, evenly in their logarithm."""
+    """Return the frequencies of a chirp [Hz]: multiples of 1 / period from low to high, evenly in
+    their logarithm."""
     first, last = math.ceil(low * period - 1e-9), math.floor(high * period + 1e-9)
     if last < first:
         return np.zeros(0)
@@ -233,7 +236,7 @@ def flip_bit(octet: int, mask: int, places: Indices, acts: Flags, out: Octets) -
             out[places[k], octet] = byte - mask if is_set else byte + mask
 
 
-class Fault(Block):
+class SignalError(Block):
     """Passes a signal on, with a fault on some of its elements while it is there:
 
     * ``stuck``: at the last value before, or at ``value``;
@@ -247,27 +250,27 @@ class Fault(Block):
       low-peak-factor signals, IEEE Trans. Information Theory, 1970). It is no fault, but what a response is measured with.
 
     It is there from ``start`` on for ``duration``, counted from the start of the run or from when its event first was.
-    Runs are those of the block that writes the signal. Subclasses made by ``fault_block_type`` fix signal and
+    Runs are those of the block that writes the signal. Subclasses made by ``signal_error_type`` fix signal and
     elements. It raises no errors: everything is checked at load.
     """
 
-    Params = FaultParameters
-    params: FaultParameters
+    Params = SignalErrorParameters
+    params: SignalErrorParameters
     target: ClassVar[str] = ""
-    """Where it is, as the graph says it."""
+    """Target of the fault, as written in the graph."""
     elements: ClassVar[dict[str, NDArray[np.int64]]] = {}
     """The places that it changes, by field."""
     compared: ClassVar[Comparison | None] = None
     """The event after which it begins, if there is one."""
 
-    state = Output(FaultState, text="whether it is there")
-    memory = State(FaultMemory, text="how far it is")
+    state = Output(SignalErrorState, text="whether it is there")
+    memory = State(SignalErrorMemory, text="how far it is")
     ring_position = State(RingPosition, text="place in the ring of earlier values")
     stream = State(StreamState, text="the random stream")
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """A fault changes values and no units."""
+        """Keep the units: a fault changes values only."""
         fields = cls.outputs["y"].signal.fields
         return {
             f"y.{name}": inputs[f"u.{name}"] for name, field in fields.items() if field.inferred
@@ -297,12 +300,12 @@ class Fault(Block):
         if self.compared is not None:
             value = next(iter(dict(ports["trigger"].views()).values())).reshape(1)
             calls.append(KernelCall(notice_event, value, self.compared, self._happened))
-        timing = FaultTiming(start, end, self.period, params.share, self.compared is not None)
+        timing = SignalErrorTiming(start, end, self.period, params.share, self.compared is not None)
         if params.share < 1.0:
             calls.append(uniform_call(self._random.generator, self._draw)[0])
         calls.append(
             KernelCall(
-                time_fault,
+                time_signal_error,
                 timing,
                 self.context.clock.present,
                 self._happened,
@@ -329,7 +332,7 @@ class Fault(Block):
     def _changes(
         self, name: str, places: NDArray[np.int64], source: NDArray[Any], target: NDArray[Any]
     ) -> list[KernelCall]:
-        """The calls that change one field."""
+        """Return the calls that change one field."""
         params, kind, size = self.params, self.params.kind, target.dtype.itemsize
         out, value = target.reshape(-1), 0.0 if params.value is None else params.value
         if "past" in self.states:
@@ -372,7 +375,7 @@ class Fault(Block):
         ]
 
     def metrics(self) -> Mapping[str, Metric]:
-        """When the fault was there first, if it was."""
+        """Return the time at which the fault first appeared, if it did."""
         began = int(self.memory.began)
         return {} if began < 0 else {"fault_time_s": began * self.context.clock.base_period}
 
@@ -382,22 +385,22 @@ class Fault(Block):
             call.run()
 
 
-def fault_block_type(
+def signal_error_type(
     signal: type[Signal],
     target: str,
     elements: dict[str, NDArray[np.int64]],
-    params: FaultParameters,
+    params: SignalErrorParameters,
     delay: int,
     compared: Comparison | None = None,
     event: type[Signal] | None = None,
     *,
     reads_truth: bool = False,
-) -> type[Fault]:
-    """The block type that puts a fault on ``signal``: input ``u``, output ``y``.
+) -> type[SignalError]:
+    """Return the block type that puts a fault on ``signal``: input ``u``, output ``y``.
 
     Args:
         signal: of the wire.
-        target: where it is, as the graph says it.
+        target: where it is, as written in the graph.
         elements: the places that change, by field, in row order.
         params: what goes wrong.
         delay: of a delayed value, in runs.
@@ -405,7 +408,7 @@ def fault_block_type(
         reads_truth: whether the event may be one that only a simulator knows.
     """
     body: dict[str, Any] = {
-        "__doc__": Fault.__doc__,
+        "__doc__": SignalError.__doc__,
         "target": target,
         "elements": elements,
         "compared": compared,
@@ -416,4 +419,4 @@ def fault_block_type(
         body["past"] = State(ring_signal(signal, delay), text="earlier values")
     if event is not None:
         body["trigger"] = Input(event, text="what begins it", reads_truth=reads_truth)
-    return type(f"Fault{signal.__name__}", (Fault,), body)
+    return type(f"SignalError{signal.__name__}", (SignalError,), body)

@@ -22,7 +22,7 @@ Length = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Radius = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
-class Part(BaseModel):
+class Element(BaseModel):
     """Immutable data that refuses unknown keys."""
 
     model_config = ConfigDict(

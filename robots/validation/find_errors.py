@@ -12,12 +12,12 @@ from ...files.validation import explain, names_at
 from ..robot_description import RobotDescription
 from ..shapes import SHAPE_KINDS
 from .actuation import check_actuation, check_thrusters
-from .faults import Draft, Path, RobotFault, nearest
+from .errors import DescriptionError, Draft, Path, nearest
 from .stance import check_feet, check_poses
 from .structure import check_bodies, check_joints, check_looks, check_names, check_tree
 
 
-def find_faults(data: Any) -> tuple[RobotFault, ...]:
+def find_errors(data: Any) -> tuple[DescriptionError, ...]:
     """Return every fault of a description, given as plain data: mappings, lists, numbers and text.
 
     A value of a wrong type is reported and otherwise passed over, so that it hides nothing else.
@@ -26,7 +26,7 @@ def find_faults(data: Any) -> tuple[RobotFault, ...]:
     if not isinstance(data, dict):
         found = "nothing" if data is None else f"a {type(data).__name__}"
         expected = "keys such as name, base, links and joints"
-        return (RobotFault((), "this describes no robot", expected, found),)
+        return (DescriptionError((), "this describes no robot", expected, found),)
     draft = Draft(data)
     check_types(draft, RobotDescription)
     check_names(draft)
@@ -38,7 +38,7 @@ def find_faults(data: Any) -> tuple[RobotFault, ...]:
     check_feet(draft)
     check_poses(draft)
     check_looks(draft)
-    return tuple(draft.faults)
+    return tuple(draft.errors)
 
 
 def check_types(draft: Draft, kind: type[BaseModel]) -> None:

@@ -13,10 +13,10 @@ import pytest
 
 from aloft.mathematics.kept_arrays import code_digest
 from aloft.planner.checking.validity import InvalidPlanError
-from aloft.planner.library import once
+from aloft.planner.library import validation_cache
 from aloft.planner.library.library import PlanLibrary, shipped_folder
-from aloft.planner.library.once import noted_folder, unless_passed
 from aloft.planner.library.reference_table import reference_table
+from aloft.planner.library.validation_cache import check_unless_noted, notes_folder
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 
@@ -37,13 +37,15 @@ def plan():
 
 def test_the_same_plan_is_checked_once_and_a_changed_one_again(plan, monkeypatch):
     checked = []
-    monkeypatch.setattr(once, "_valid", once.ResultCache())
-    monkeypatch.setattr(once, "require_valid", lambda plan, robot: checked.append(plan))
-    once.require_valid_once(plan, ROBOT)
-    once.require_valid_once(replace(plan, com=plan.com.copy()), ROBOT)
+    monkeypatch.setattr(validation_cache, "_valid", validation_cache.ResultCache())
+    monkeypatch.setattr(validation_cache, "require_valid", lambda plan, robot: checked.append(plan))
+    validation_cache.require_valid_cached(plan, ROBOT)
+    validation_cache.require_valid_cached(replace(plan, com=plan.com.copy()), ROBOT)
     assert len(checked) == 1
-    once.require_valid_once(replace(plan, com=plan.com + 1e-12), ROBOT)
-    once.require_valid_once(plan, ROBOT.with_profile("koala").model_copy(update={"name": "x"}))
+    validation_cache.require_valid_cached(replace(plan, com=plan.com + 1e-12), ROBOT)
+    validation_cache.require_valid_cached(
+        plan, ROBOT.with_profile("koala").model_copy(update={"name": "x"})
+    )
     assert len(checked) == 3
 
 
@@ -51,23 +53,23 @@ def test_a_plan_that_is_not_valid_is_refused_every_time(plan):
     wrong = replace(plan, contact_force=2.0 * plan.contact_force)
     for _ in range(2):
         with pytest.raises(InvalidPlanError):
-            once.require_valid_once(wrong, ROBOT)
+            validation_cache.require_valid_cached(wrong, ROBOT)
 
 
 def test_tables_are_shared_by_what_they_are_made_from(plan):
-    first = once.reference_table_once(plan, ROBOT, 0.2)
-    assert once.reference_table_once(plan, ROBOT, 0.2) is first
-    later = once.reference_table_once(plan, ROBOT, 0.3)
+    first = validation_cache.cached_reference_table(plan, ROBOT, 0.2)
+    assert validation_cache.cached_reference_table(plan, ROBOT, 0.2) is first
+    later = validation_cache.cached_reference_table(plan, ROBOT, 0.3)
     assert later is not first
     np.testing.assert_allclose(later.time[2:] - first.time[2:], 0.1)
 
 
 def test_only_the_results_used_last_are_kept():
-    kept = once.ResultCache[int]()
-    for key in range(once.KEPT + 1):
+    kept = validation_cache.ResultCache[int]()
+    for key in range(validation_cache.KEPT + 1):
         kept.get(key, lambda key=key: key)
     assert kept.get(0, lambda: -1) == -1
-    assert kept.get(once.KEPT, lambda: -1) == once.KEPT
+    assert kept.get(validation_cache.KEPT, lambda: -1) == validation_cache.KEPT
 
 
 @pytest.mark.long
@@ -75,11 +77,11 @@ def test_only_the_results_used_last_are_kept():
 def test_a_later_process_finds_the_very_table(task, monkeypatch):
     plan = PlanLibrary(ROBOT).find(read_task(shipped_folder() / "tasks" / f"{task}.yaml"))
     made = reference_table(plan, ROBOT, 0.2)
-    monkeypatch.setattr(once, "_tables", once.ResultCache())
-    once.reference_table_once(plan, ROBOT, 0.2)
-    monkeypatch.setattr(once, "_tables", once.ResultCache())
-    monkeypatch.setattr(once, "reference_table", None)  # not needed any more
-    found = once.reference_table_once(plan, ROBOT, 0.2)
+    monkeypatch.setattr(validation_cache, "_tables", validation_cache.ResultCache())
+    validation_cache.cached_reference_table(plan, ROBOT, 0.2)
+    monkeypatch.setattr(validation_cache, "_tables", validation_cache.ResultCache())
+    monkeypatch.setattr(validation_cache, "reference_table", None)  # not needed any more
+    found = validation_cache.cached_reference_table(plan, ROBOT, 0.2)
     assert {**vars(found), "time": 0, "columns": 0, "contact": 0} == {
         **vars(made), "time": 0, "columns": 0, "contact": 0,
     }  # fmt: skip
@@ -113,16 +115,16 @@ class Check:
 def test_what_has_passed_is_not_checked_again_and_other_content_is() -> None:
     check = Check()
     for content in (b"one", b"one", b"other", b"one"):
-        unless_passed(content, check)
+        check_unless_noted(content, check)
     assert check.calls == 2
-    assert len(list(noted_folder().iterdir())) == 2
+    assert len(list(notes_folder().iterdir())) == 2
 
 
 def test_what_has_failed_is_checked_every_time() -> None:
     check = Check(fails=True)
     for _ in range(2):
         with pytest.raises(ValueError, match="not valid"):
-            unless_passed(b"one", check)
+            check_unless_noted(b"one", check)
     assert check.calls == 2
 
 
@@ -130,17 +132,17 @@ def test_another_check_does_not_believe_what_this_one_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     check = Check()
-    unless_passed(b"one", check)
-    monkeypatch.setattr(once, "_code", lambda: b"a changed test")
-    unless_passed(b"one", check)
+    check_unless_noted(b"one", check)
+    monkeypatch.setattr(validation_cache, "_code", lambda: b"a changed test")
+    check_unless_noted(b"one", check)
     assert check.calls == 2
 
 
 def test_the_code_of_the_check_is_part_of_it() -> None:
-    root = Path(once.__file__).parents[2]
-    for folder in once.FOLDERS:
+    root = Path(validation_cache.__file__).parents[2]
+    for folder in validation_cache.FOLDERS:
         assert list((root / folder).rglob("*.py")), folder
-    assert once._code() == code_digest(*once.FOLDERS)
+    assert validation_cache._code() == code_digest(*validation_cache.FOLDERS)
 
 
 def test_without_a_place_for_notes_it_is_checked_every_time(
@@ -149,6 +151,6 @@ def test_without_a_place_for_notes_it_is_checked_every_time(
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     check = Check()
-    unless_passed(b"one", check)
-    unless_passed(b"one", check)
+    check_unless_noted(b"one", check)
+    check_unless_noted(b"one", check)
     assert check.calls == 2

@@ -19,8 +19,8 @@ _ROBOT = re.compile(r"^robot: (?P<name>.*)$", re.MULTILINE)
 
 
 def with_robot_beside(graph: CheckedGraph, text: str, folder: Path) -> str:
-    """The text of a graph that finds its robot in ``folder``, where the robot is described by a file: its
-    description is written there, as ``robot.yaml``."""
+    """Return the text of a graph that finds its robot in ``folder``, where the robot is described
+    by a file: its description is written there, as ``robot.yaml``."""
     found = _ROBOT.search(text)
     if found is None or graph.robot is None:
         return text
@@ -32,7 +32,7 @@ def with_robot_beside(graph: CheckedGraph, text: str, folder: Path) -> str:
 
 
 def is_own_module(imported: str) -> bool:
-    """Whether a module is a file of the user's, and not installed."""
+    """Return whether a module is a file of the user's, and not installed."""
     file = Path(getattr(sys.modules.get(imported), "__file__", None) or "")
     return file.is_file() and "site-packages" not in file.parts
 
@@ -61,7 +61,7 @@ def copy_module(name: str, imported: str, folder: Path) -> None:
 
 
 def _imported(file: Path, root: Path) -> Iterator[Path]:
-    """The files below ``root`` that a module imports, with the packages they are in."""
+    """Yield the files below ``root`` that a module imports, with the packages they are in."""
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         names: list[str] = []
         base = root

@@ -1,4 +1,4 @@
-"""Faults of a robot's description, the error that carries all of them, and the description while it is checked."""
+"""Errors of a robot's description, the exception that carries all of them, and the description while it is checked."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Path = tuple[str | int, ...]
 
 
 @dataclass(frozen=True)
-class RobotFault:
-    """One fault in the description of a robot.
+class DescriptionError:
+    """One error in the description of a robot.
 
     Attributes:
         path: where it is in the data, by keys and list indices, such as ``("links", 2, "mass")``.
@@ -52,24 +52,35 @@ class RobotFault:
 
 
 class RobotError(ValueError):
-    """A description that describes no robot; its text lists every fault.
+    """A description that describes no robot; its text lists every error.
 
     Attributes:
         file: the file it was read from, as text; a name where there was no file.
-        faults: every fault, in the order of the file.
+        faults: every error, in the order of the file.
     """
 
-    def __init__(self, file: str, faults: Iterable[RobotFault]) -> None:
+    def __init__(self, file: str, errors: Iterable[DescriptionError]) -> None:
         self.file = file
-        self.faults = tuple(
-            sorted(faults, key=lambda fault: (fault.file, fault.line, fault.column))
+        self.errors = tuple(
+            sorted(
+                errors,
+                key=lambda description_error: (
+                    description_error.file,
+                    description_error.line,
+                    description_error.column,
+                ),
+            )
         )
-        count = len(self.faults)
-        headline = f"{file}: {count} fault{'s' if count != 1 else ''} in the robot's description"
-        super().__init__("\n".join([*(fault.text(file) for fault in self.faults), headline]))
+        count = len(self.errors)
+        headline = f"{file}: {count} error{'s' if count != 1 else ''} in the robot's description"
+        super().__init__(
+            "\n".join(
+                [*(description_error.text(file) for description_error in self.errors), headline]
+            )
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return RobotError, (self.file, self.faults)
+        return RobotError, (self.file, self.errors)
 
 
 def nearest(name: str, legal: Iterable[str]) -> str:
@@ -87,24 +98,24 @@ def vector(values: Iterable[float]) -> str:
     return f"[{', '.join(number(value) for value in values)}]"
 
 
-Part = TypeVar("Part", bound=BaseModel)
+ElementType = TypeVar("ElementType", bound=BaseModel)
 
 
 class Draft:
-    """Data of a description, of which some may be unreadable, and the faults found in it.
+    """Data of a description, of which some may be unreadable, and the errors found in it.
 
     The checks look at the parts that can be read, so one wrong type hides nothing elsewhere.
     """
 
     def __init__(self, data: Mapping[str, Any]) -> None:
         self.data = data
-        self.faults: list[RobotFault] = []
+        self.errors: list[DescriptionError] = []
 
     def add(
         self, path: Path, message: str, expected: str = "", found: str = "", fix: str = ""
     ) -> None:
-        """Note a fault."""
-        self.faults.append(RobotFault(path, message, expected, found, fix))
+        """Note an error."""
+        self.errors.append(DescriptionError(path, message, expected, found, fix))
 
     def unknown(self, path: Path, what: str, name: str, kind: str, legal: Sequence[str]) -> None:
         """Report a name that no link, joint or foot has."""
@@ -116,13 +127,13 @@ class Draft:
             right,
         )  # fmt: skip
 
-    def parts(self, key: str, kind: type[Part]) -> list[tuple[int, Part]]:
+    def elements(self, key: str, kind: type[ElementType]) -> list[tuple[int, ElementType]]:
         """Return the readable elements of the list under ``key``, each with its index."""
         found = self.data.get(key)
         if not isinstance(found, Sequence) or isinstance(found, str):
             return []
-        parts = ((k, read(kind, element)) for k, element in enumerate(found))
-        return [(k, part) for k, part in parts if part is not None]
+        elements = ((k, read(kind, element)) for k, element in enumerate(found))
+        return [(k, element) for k, element in elements if element is not None]
 
     def entries(self, key: str) -> Iterator[tuple[str, Any]]:
         """Yield the entries of the mapping under ``key`` whose keys are text."""
@@ -139,7 +150,7 @@ class Draft:
         return [name for name in named if isinstance(name, str)]
 
 
-def read(kind: type[Part], value: Any) -> Part | None:
+def read(kind: type[ElementType], value: Any) -> ElementType | None:
     """Return the value as that part of a description; None where it cannot be read."""
     try:
         return kind.model_validate(value)

@@ -2,7 +2,7 @@
 
 ::
 
-    step = LibraryCall(partial(mujoco.mj_step1, model, data), address, model_address, data_address)
+    step = ForeignCall(partial(mujoco.mj_step1, model, data), address, model_address, data_address)
 
 ``run`` calls it through its own module for Python. Where the address of the function is known a
 ``CallSequence`` calls it without the interpreter.
@@ -24,7 +24,7 @@ MOST = 3
 """The largest number of arguments."""
 
 
-class LibraryCall:
+class ForeignCall:
     """One call of a function of C, whose arguments are fixed once.
 
     Args:
@@ -53,7 +53,8 @@ class LibraryCall:
 
     @property
     def compiled(self) -> NDArray[np.int64] | None:
-        """What keeps the call alive, as that of a ``KernelCall``; none where Python makes it."""
+        """Words that keep the call alive, as those of a ``KernelCall``; ``None`` where Python makes
+        it."""
         return self.words if self.words[0] else None
 
     @property
@@ -74,14 +75,14 @@ class LibraryCall:
 
 
 def address_of(function: Any) -> int:
-    """The address of a function of a library that ``ctypes`` has loaded."""
+    """Return the address of a function of a library that ``ctypes`` has loaded."""
     return ctypes.cast(function, ctypes.c_void_p).value or 0
 
 
 @cache
 def _caller(count: int) -> int:
-    """The address of machine code that calls the function whose address, and whose ``count``
-    arguments, are the words at an address."""
+    """Return the address of machine code that calls a function; the words at an address are those
+    of the function and of its ``count`` arguments."""
     from llvmlite import ir
 
     word = ir.IntType(64)

@@ -1,4 +1,4 @@
-"""What a run depended on beside its graph: the files that parameters name, and the user's project.
+"""Dependencies of a run beside its graph: the files that parameters name, and the user's project.
 
 A file is known by an entry and by the SHA-256 of its content. The entry of a file that a parameter
 names is ``block.parameter: value``. A file that a block found in a folder, which one of its
@@ -29,7 +29,7 @@ MOST_CARRIED = 1 << 24
 
 
 def parameter_files(graph: CheckedGraph) -> dict[str, Path]:
-    """Every file that a parameter names, by its entry.
+    """Return every file that a parameter names, by its entry.
 
     A file is looked for beside the graph, and then among the shipped graphs.
     """
@@ -42,9 +42,9 @@ def parameter_files(graph: CheckedGraph) -> dict[str, Path]:
 
 
 def files_read(bound: BoundGraph) -> dict[str, Path]:
-    """As ``parameter_files``, with the files that blocks have found themselves when they were set up,
-    such as plans: those in a block's attribute ``files_read``. The block's attribute ``files_folder``
-    may name the parameter that says in which folder they are looked for first."""
+    """Return ``parameter_files`` and the files that blocks have found themselves when they were set
+    up, such as plans: those in a block's attribute ``files_read``. The block's attribute
+    ``files_folder`` may name the parameter that says in which folder they are looked for first."""
     found = parameter_files(bound.graph)
     for path, block in bound.blocks.items():
         folder = getattr(block, "files_folder", "")
@@ -55,18 +55,19 @@ def files_read(bound: BoundGraph) -> dict[str, Path]:
 
 
 def found_name(file: Path) -> str:
-    """What a file that a block found is called: a shipped one by its place, another by its name."""
+    """Return the name of a file that a block found: of a shipped one its place, of another its own
+    name."""
     file = file.absolute()
     return file.relative_to(_SHIPPED).as_posix() if file.is_relative_to(_SHIPPED) else file.name
 
 
 def digests(files: Mapping[str, Path]) -> dict[str, str]:
-    """The SHA-256 of every file, by its entry."""
+    """Compute the SHA-256 of every file, by its entry."""
     return {entry: sha256(path.read_bytes()).hexdigest() for entry, path in files.items()}
 
 
 def contents(files: Mapping[str, Path]) -> dict[str, str]:
-    """The content of files as text, by SHA-256, as far as ``MOST_CARRIED`` allows."""
+    """Return the content of files as text, by SHA-256, as far as ``MOST_CARRIED`` allows."""
     return dict(_contents(files))
 
 
@@ -81,12 +82,12 @@ def _contents(files: Mapping[str, Path]) -> Iterator[tuple[str, str]]:
 
 
 def unpacked(content: str) -> bytes:
-    """The bytes of a file from the text that ``contents`` made."""
+    """Unpack the bytes of a file from the text that ``contents`` made."""
     return zlib.decompress(b64decode(content))
 
 
 def other_files(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
-    """What has become of the files ``then``, in words."""
+    """Describe the changes of the files ``then`` in words."""
     found = []
     for name, content in then.items():
         if name not in now:
@@ -97,7 +98,7 @@ def other_files(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
 
 
 def named_file(value: Any, folder: Path) -> Path | None:
-    """The file that a parameter's value names, beside the graph or among the shipped graphs."""
+    """Find the file that a parameter's value names, beside the graph or among the shipped graphs."""
     if not isinstance(value, str | Path) or not str(value) or "\n" in str(value):
         return None
     try:
@@ -111,8 +112,8 @@ def named_file(value: Any, folder: Path) -> Path | None:
 
 
 def project_state(folder: Path) -> str:
-    """The commit of the project that ``folder`` is in, and whether files differ from it; empty where
-    it is no project under git."""
+    """Return the commit of the project that ``folder`` is in, and whether files differ from it;
+    empty where it is no project under git."""
     try:
         commit = _git(folder, "rev-parse", "HEAD")
         changed = _git(folder, "status", "--porcelain", "--untracked-files=no")

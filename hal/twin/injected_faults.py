@@ -23,11 +23,11 @@ ANSWERS: tuple[Kind, ...] = ("lost", "truncated", "corrupted", "late")
 
 
 class InjectedFault(Parameters):
-    """One fault, as a graph says it: ``{kind: dead, start: 0.5 s, target: left_knee_motor}``."""
+    """One fault, as a graph has it: ``{kind: dead, start: 0.5 s, target: left_knee_motor}``."""
 
-    kind: Kind = parameter(..., text="what goes wrong")
-    start: float = parameter(0.0, unit="s", ge=0, text="when, after the robot was let go")
-    duration: float = parameter(1e6, unit="s", gt=0, text="for how long; by default to the end")
+    kind: Kind = parameter(..., text="kind of the fault")
+    start: float = parameter(0.0, unit="s", ge=0, text="start, after the robot was let go")
+    duration: float = parameter(1e6, unit="s", gt=0, text="its duration; by default to the end")
     target: str = parameter(
         "", text="the motor, or the contact point of a switch; by default all of them"
     )
@@ -37,9 +37,9 @@ class InjectedFault(Parameters):
     value: float = parameter(0.0, text="a low voltage [V], a high temperature [deg C]")
 
 
-class Faults:
-    """Which faults are there at an instant. What befalls a share only is drawn from the seed, the
-    exchange and the place, so that it does not depend on what was drawn before."""
+class InjectedFaults:
+    """The faults at an instant. For a fault that befalls only a share, draws follow from the seed, the exchange and the
+    place, so that they do not depend on those before."""
 
     def __init__(self, faults: Sequence[InjectedFault], seed: int) -> None:
         self._faults = tuple(faults)
@@ -51,7 +51,7 @@ class Faults:
         return bool(self._faults)
 
     def active(self, *kinds: Kind) -> list[InjectedFault]:
-        """The faults of these kinds that are there now."""
+        """Return the faults of these kinds that are there now."""
         if not self._faults:
             return []
         return [
@@ -78,7 +78,7 @@ class Faults:
 
 
 def apply_fault(fault: InjectedFault, answer: bytes, draws: np.random.Generator) -> bytes:
-    """The bytes of a drive's answer that really travel; empty where none do in time."""
+    """Return the bytes of a drive's answer that really travel; empty where none do in time."""
     if fault.kind == "truncated":
         return answer[: int(draws.integers(0, len(answer)))]
     if fault.kind == "corrupted":
@@ -87,18 +87,18 @@ def apply_fault(fault: InjectedFault, answer: bytes, draws: np.random.Generator)
 
 
 def corrupt_byte(data: bytes, draws: np.random.Generator) -> bytes:
-    """The data with one byte changed at random."""
+    """Return the data with one byte changed at random."""
     hurt = bytearray(data)
     hurt[int(draws.integers(0, len(hurt)))] ^= int(draws.integers(1, 256))
     return bytes(hurt)
 
 
 def read_fault(text: str) -> InjectedFault:
-    """The fault of a text such as ``dead 0.5 left_knee_motor`` or ``lost 1 * share=0.1``: the kind,
-    its start in seconds, its target (``*`` for all), and further settings.
+    """Read a fault from a text such as ``dead 0.5 left_knee_motor`` or ``lost 1 * share=0.1``: the kind, its start in
+    seconds, its target (``*`` for all), and further settings.
 
     Raises:
-        AloftError: it is none; the message says what is wrong.
+        AloftError: it is none; the message names the mistake.
     """
     settings: dict[str, Any] = {}
     names = ["kind", "start", "target"]

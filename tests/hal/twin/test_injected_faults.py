@@ -9,7 +9,7 @@ import pytest
 
 from aloft.blocks.signals import CommandMode, DrivePhase
 from aloft.hal.bear.protocol import FrameReader, frame_bytes
-from aloft.hal.twin.faults import Faults, InjectedFault, corrupt_byte, read_fault
+from aloft.hal.twin.injected_faults import InjectedFault, InjectedFaults, corrupt_byte, read_fault
 from aloft.hal.twin.twin_robot import TwinRobot
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import AloftError
@@ -149,7 +149,7 @@ def test_switches(kind: str) -> None:
 
 
 def test_before_the_robot_was_let_go_there_are_none() -> None:
-    faults = Faults([InjectedFault(kind="lost", start=0.0)], 0)
+    faults = InjectedFaults([InjectedFault(kind="lost", start=0.0)], 0)
     assert not faults.active("lost")
     faults.now = 0.0
     assert faults.active("lost") and not faults.active("late")
@@ -157,7 +157,7 @@ def test_before_the_robot_was_let_go_there_are_none() -> None:
 
 def test_a_share_is_drawn_from_seed_exchange_and_place_only() -> None:
     def drawn(seed: int, target: str) -> list[bool]:
-        faults = Faults([InjectedFault(kind="lost", share=0.3)], seed)
+        faults = InjectedFaults([InjectedFault(kind="lost", share=0.3)], seed)
         faults.now = 1.0
         found = []
         for exchange in range(300):

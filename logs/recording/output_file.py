@@ -1,4 +1,4 @@
-"""The place of a recording: written under a name of its own that is locked, then renamed.
+"""The file of a recording: written under a name of its own that is locked, then renamed.
 
 While ``jump.rrd`` is written it is called ``jump.part.rrd``, and whoever writes it holds an
 exclusive lock on it. Anybody may read it meanwhile. What was called ``jump.rrd`` before stays there
@@ -20,24 +20,24 @@ try:
 except ImportError:  # on Windows; there another writer is not noticed
     fcntl = None  # type: ignore[assignment]  # not on Windows
 
-PART = ".part"
+UNFINISHED = ".part"
 _MOST_NAMES = 100
 
 
-def part_of(path: Path) -> Path:
-    """The name under which the recording ``path`` is written."""
-    return path.with_name(f"{path.stem}{PART}{path.suffix}")
+def unfinished_name(path: Path) -> Path:
+    """Return the name under which the recording ``path`` is written."""
+    return path.with_name(f"{path.stem}{UNFINISHED}{path.suffix}")
 
 
-def whole_of(path: Path) -> Path | None:
-    """The recording that is written under the name ``path``; ``None`` if it is no such name."""
-    if not path.stem.endswith(PART):
+def finished_name(path: Path) -> Path | None:
+    """Return the recording that is written under the name ``path``; ``None`` if it is no such name."""
+    if not path.stem.endswith(UNFINISHED):
         return None
-    return path.with_name(f"{path.stem.removesuffix(PART)}{path.suffix}")
+    return path.with_name(f"{path.stem.removesuffix(UNFINISHED)}{path.suffix}")
 
 
 def is_being_written(path: Path) -> bool:
-    """Whether a recorder is writing the file ``path``. Raises ``OSError`` if it is not there."""
+    """Tell whether a recorder is writing the file ``path``. Raises ``OSError`` if it is not there."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         return not _lock(descriptor)
@@ -60,8 +60,8 @@ def _lock(descriptor: int) -> bool:
 
 
 @dataclass
-class RecordingPlace:
-    """A recording's place, locked by this process and by those that inherit ``descriptor``.
+class OutputFile:
+    """The file of a recording, locked by this process and by those that inherit ``descriptor``.
 
     Attributes:
         target: the name that the recording will have.
@@ -76,9 +76,9 @@ class RecordingPlace:
     said: tuple[str, ...] = ()
 
     @property
-    def part(self) -> Path:
+    def unfinished(self) -> Path:
         """The private name."""
-        return part_of(self.target)
+        return unfinished_name(self.target)
 
     def close(self) -> None:
         """Close the file; the lock goes when the last process has closed it."""
@@ -89,7 +89,7 @@ class RecordingPlace:
         """Remove the file, into which nothing has come; what had its name before stays."""
         with suppress(OSError):
             if self._is_there():
-                self.part.unlink()
+                self.unfinished.unlink()
 
     def publish(self) -> str:
         """Give the file its name. Returns a warning if it had been removed, else nothing.
@@ -101,34 +101,35 @@ class RecordingPlace:
         if not self._is_there():
             self._write_again()
             warning = (
-                f"somebody removed {self.part} while the run went on; it was written again when "
+                f"somebody removed {self.unfinished} while the run went on; it was written again when "
                 "the run ended"
             )
         for number in range(self.keep, 0, -1):
             older = self.target if number == 1 else _numbered(self.target, number - 1)
             if older.exists():
                 os.replace(older, _numbered(self.target, number))
-        os.replace(self.part, self.target)
+        os.replace(self.unfinished, self.target)
         return warning
 
     def _is_there(self) -> bool:
         try:
-            return os.path.samestat(os.fstat(self.descriptor), os.stat(self.part))
+            return os.path.samestat(os.fstat(self.descriptor), os.stat(self.unfinished))
         except FileNotFoundError:
             return False
 
     def _write_again(self) -> None:
         """Copy the file, which has no name any more, to its private name."""
-        self.part.parent.mkdir(parents=True, exist_ok=True)
-        with self.part.open("wb") as file:
-            place = 0
-            while piece := os.pread(self.descriptor, 1 << 20, place):
+        self.unfinished.parent.mkdir(parents=True, exist_ok=True)
+        with self.unfinished.open("wb") as file:
+            offset = 0
+            while piece := os.pread(self.descriptor, 1 << 20, offset):
                 file.write(piece)
-                place += len(piece)
+                offset += len(piece)
 
 
 def split_name(path: Path, number: int) -> Path:
-    """The name of a later file of a recording in several: ``jump-part002.rrd`` follows ``jump.rrd``."""
+    """Return the name of a later file of a recording in several: ``jump-part002.rrd`` follows
+    ``jump.rrd``."""
     return path.with_name(f"{path.stem}-part{number:03d}{path.suffix}")
 
 
@@ -136,7 +137,7 @@ def _numbered(path: Path, number: int) -> Path:
     return path.with_name(f"{path.stem}.{number}{path.suffix}")
 
 
-def take_place(path: Path, keep: int = 0) -> RecordingPlace:
+def reserve_output(path: Path, keep: int = 0) -> OutputFile:
     """Make and lock the file in which the recording ``path`` is written.
 
     If another run writes that recording, this one gets the next free name, ``jump-2.rrd``. A file
@@ -154,39 +155,41 @@ def take_place(path: Path, keep: int = 0) -> RecordingPlace:
     path.parent.mkdir(parents=True, exist_ok=True)
     for number in range(1, _MOST_NAMES):
         target = path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
-        place = _take(target, keep)
-        if place is not None:
+        output = _take(target, keep)
+        if output is not None:
             if number > 1:
                 text = f"another run is being recorded in {path}; this one goes to {target}"
-                place.said = (text, *place.said)
-            return place
+                output.said = (text, *output.said)
+            return output
     raise OSError(errno.EBUSY, f"{_MOST_NAMES} runs are being recorded under this name", str(path))
 
 
 def _kind_of(path: Path) -> str:
-    """What ``path`` is, which is no file, in words."""
+    """Describe ``path``, which is no file, in words."""
     if path.is_fifo():
         return "a FIFO"
     return "a socket" if path.is_socket() else "a device"
 
 
-def _take(target: Path, keep: int) -> RecordingPlace | None:
-    """The place of ``target``, or ``None`` if another run has it."""
-    part, said = part_of(target), ""
+def _take(target: Path, keep: int) -> OutputFile | None:
+    """Take the place of ``target``; return ``None`` if another run has it."""
+    unfinished, said = unfinished_name(target), ""
     while True:
-        descriptor = os.open(part, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        descriptor = os.open(unfinished, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         try:
             if not _lock(descriptor):
                 os.close(descriptor)
                 return None
-            there = part.exists() and os.path.samestat(os.fstat(descriptor), os.stat(part))
+            there = unfinished.exists() and os.path.samestat(
+                os.fstat(descriptor), os.stat(unfinished)
+            )
             if there and not os.fstat(descriptor).st_size:
-                return RecordingPlace(target, descriptor, keep, (said,) if said else ())
+                return OutputFile(target, descriptor, keep, (said,) if said else ())
             if there:
                 moved = _free(target)
-                os.replace(part, moved)
+                os.replace(unfinished, moved)
                 said = (
-                    f"{part} was left by a run whose recorder was killed; it is kept as {moved} "
+                    f"{unfinished} was left by a run whose recorder was killed; it is kept as {moved} "
                     f"('aloft log repair {moved}' mends it)"
                 )
         except BaseException:
@@ -196,7 +199,7 @@ def _take(target: Path, keep: int) -> RecordingPlace | None:
 
 
 def _free(target: Path) -> Path:
-    """A name beside ``target`` that nothing has."""
+    """Find a free name beside ``target``."""
     number = 1
     while True:
         suffix = "" if number == 1 else f"-{number}"
@@ -207,7 +210,8 @@ def _free(target: Path) -> Path:
 
 
 def replaced(path: Path, keep: int = 0) -> str:
-    """What becomes of the recording that has the name ``path`` now, in words; empty without one."""
+    """Describe the fate of the recording that has the name ``path`` now, in words; empty without
+    one."""
     try:
         made = datetime.fromtimestamp(path.stat().st_mtime)
     except OSError:
@@ -222,8 +226,8 @@ ELSEWHERE = "--record FILE writes elsewhere, --no-record writes none"
 
 
 def remedy(number: int, path: Path | None, elsewhere: str = ELSEWHERE) -> str:
-    """The fix for an error with the system's ``number`` (as in ``errno``) at ``path``, in words;
-    ``elsewhere`` says how to do without that place."""
+    """Describe the fix for an error with the system's ``number`` (as in ``errno``) at ``path``, in
+    words; ``elsewhere`` says how to do without that place."""
     if number in (errno.ENOSPC, errno.EDQUOT):
         return f"make room{_room(path)}, or {elsewhere}"
     if number == errno.EFBIG:
@@ -234,12 +238,13 @@ def remedy(number: int, path: Path | None, elsewhere: str = ELSEWHERE) -> str:
 
 
 def cause_of(error: BaseException) -> int:
-    """The system's number of what went wrong, also where a clearer error stands for it; or zero."""
+    """Return the system's number of the underlying error, also where a clearer error stands for it;
+    or zero."""
     return getattr(error.__cause__ or error, "errno", None) or 0
 
 
 def _room(path: Path | None) -> str:
-    """How much room is left where ``path`` lies."""
+    """Describe the free space on the disk of ``path``."""
     if path is None:
         return ""
     folder = path.absolute().parent

@@ -5,8 +5,8 @@ import subprocess
 from hashlib import sha256
 from pathlib import Path
 
+from aloft.logs.file.dependencies import other_files, project_state, unpacked
 from aloft.logs.file.header import header_of, machine
-from aloft.logs.file.surroundings import other_files, project_state, unpacked
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.parameters import Parameters, parameter
 from aloft.runtime.language.signals import Field, Signal

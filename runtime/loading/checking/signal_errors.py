@@ -17,24 +17,24 @@ from numpy.typing import NDArray
 from ....files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 from ....files.problems import Code, Position, Problems, listing, nearest
 from ...language.errors import UnitError
-from ...language.fault import (
+from ...language.signal_error import (
     CONDITION,
     FOLDER,
     HOLDING,
     OPTIONS,
     SIGNS,
     Comparison,
-    Fault,
-    FaultParameters,
+    SignalError,
+    SignalErrorParameters,
     chirp_lines,
-    fault_block_type,
+    signal_error_type,
 )
 from ...language.signals import Field, Signal
 from ...language.units import parse_quantity
-from ..flattening.flat import FlatBlock, FlatGraph, FlatWire, WireElement, WirePart
+from ..flattening.flat import FlatBlock, FlatGraph, FlatWire, WireElement, WireSlice
 from ..reading.selection import Selection, read_selection, select
 from .block_check import BlockDraft
-from .inserted import part_signal
+from .inserted import selected_signal
 from .parameters import check_parameters
 from .settings import Settings
 
@@ -42,14 +42,14 @@ COMMON = ("on", "kind", "when", "start", "start_spread", "duration", "seed")
 """The keys of every fault."""
 
 
-def insert_faults(
+def insert_signal_errors(
     graph: FlatGraph, drafts: dict[str, BlockDraft], settings: Settings, problems: Problems
 ) -> dict[str, BlockDraft]:
-    """The drafts with a block for every fault, and the wires of its readers moved to it."""
+    """Return the drafts with a block for every fault, and the wires of its readers moved to it."""
     latest: dict[str, str] = {}
     for entry in graph.faults or ():
         if isinstance(entry.value, MapNode):
-            made = _FaultReader(
+            made = _SignalErrorReader(
                 graph, drafts, settings, problems, entry, entry.value, latest
             ).read()
             if made is not None:
@@ -66,7 +66,7 @@ def insert_faults(
     return drafts
 
 
-class _FaultReader:
+class _SignalErrorReader:
     def __init__(
         self, graph: FlatGraph, drafts: Mapping[str, BlockDraft], settings: Settings,
         problems: Problems, entry: Entry, node: MapNode, latest: dict[str, str],
@@ -78,7 +78,7 @@ class _FaultReader:
         self.path = f"{FOLDER}{entry.key}"
 
     def read(self) -> BlockDraft | None:
-        """The block; ``None`` after a problem."""
+        """Read the fault's block; ``None`` after a problem."""
         before = len(self.problems)
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.name) or self.path in self.drafts:
             self._report(f"{self.name!r} cannot name a fault", self.where, found=self.name,
@@ -107,7 +107,7 @@ class _FaultReader:
         return self._draft(port, source, elements, params, listing(text for text, _ in texts))
 
     def _kind(self) -> str | None:
-        """The kind, and that its keys go with it."""
+        """Read the kind, and check that its keys go with it."""
         entry = self.node.get("kind")
         value = plain(entry.value) if entry is not None else None
         if value not in OPTIONS:
@@ -134,7 +134,7 @@ class _FaultReader:
         return str(value)
 
     def _targets(self) -> list[tuple[str, Position]]:
-        """The texts of ``on`` with their places."""
+        """Return the texts of ``on`` with their places."""
         entry = self.node.get("on")
         if entry is None:
             self._report("the fault does not say where it is", self.node.where, found="nothing",
@@ -148,7 +148,7 @@ class _FaultReader:
     def _place(
         self, text: str, where: Position
     ) -> tuple[str, tuple[BlockDraft, type[Signal]], Selection] | None:
-        """The ``block.port`` of a target, who writes it with what signal, and the selection."""
+        """Find the ``block.port`` of a target, its writer with its signal, and the selection."""
         read = read_selection(text)
         if read is None:
             self._report(f"{text!r} is neither an output nor an input", where, found=text,
@@ -175,7 +175,7 @@ class _FaultReader:
                 return None
             return port, (draft, draft.outputs[name].signal), selection
         wire = draft.flat.wires.get(name)
-        if wire is None or wire.constant is not None or wire.parts:
+        if wire is None or wire.constant is not None or wire.slices:
             what = "not wired" if wire is None else "a constant" if wire.constant is not None else "composed of parts"  # fmt: skip
             self._report(f"{self.at} is on the input {port}, which is {what}", where, found=what,
                          expected="an input that is wired to one output, or an output")  # fmt: skip
@@ -190,7 +190,7 @@ class _FaultReader:
         places: list[tuple[str, tuple[BlockDraft, type[Signal]], Selection]],
         kind_of: str, texts: list[tuple[str, Position]],
     ) -> dict[str, NDArray[np.int64]] | None:  # fmt: skip
-        """The places that change, by field."""
+        """Find the places that change, by field."""
         found: dict[str, NDArray[np.int64]] = {}
         names = _element_names(self.settings)
         for (_, _, selection), (text, where) in zip(places, texts, strict=True):
@@ -231,8 +231,8 @@ class _FaultReader:
                 found[name] = np.unique(np.concatenate([found.get(name, chosen[:0]), chosen]))
         return found
 
-    def _parameters(self, kind_of: str, fields: list[Field]) -> FaultParameters | None:
-        """The parameters, in which a value with a unit is a number in that of the field."""
+    def _parameters(self, kind_of: str, fields: list[Field]) -> SignalErrorParameters | None:
+        """Read the parameters, in which a value with a unit is a number in that of the field."""
         entries = []
         for entry in self.node:
             if entry.key in ("on", "when") or entry.key.startswith("_"):
@@ -258,8 +258,8 @@ class _FaultReader:
             entries.append(replace(entry, value=node))
         flat = FlatBlock(self.at, self.where, "", self.where, self.graph.folder,
                          MapNode(tuple(entries), self.node.where))  # fmt: skip
-        params = check_parameters(flat, Fault, self.problems, self.settings.robot)
-        if not isinstance(params, FaultParameters):
+        params = check_parameters(flat, SignalError, self.problems, self.settings.robot)
+        if not isinstance(params, SignalErrorParameters):
             return None
         widest = (
             8 * np.dtype(fields[0].dtype_name).itemsize if fields[0].dtype_name != "bool" else 1
@@ -277,7 +277,7 @@ class _FaultReader:
 
     def _draft(
         self, port: str, source: tuple[BlockDraft, type[Signal]],
-        elements: dict[str, NDArray[np.int64]], params: FaultParameters, target: str,
+        elements: dict[str, NDArray[np.int64]], params: SignalErrorParameters, target: str,
     ) -> BlockDraft | None:  # fmt: skip
         draft, signal = source
         path, _, name = port.rpartition(".")
@@ -304,7 +304,7 @@ class _FaultReader:
                              expected=f"below {highest:g} Hz, half the rate at which {port} is written",
                              found=f"{params.high:g} Hz")  # fmt: skip
                 return None
-        block_type = fault_block_type(
+        block_type = signal_error_type(
             signal, target, elements, params, delay, compared, event_signal, reads_truth=truth
         )
         wires = {"u": FlatWire(written, self.where)}
@@ -330,8 +330,8 @@ class _FaultReader:
         return made
 
     def _event(self) -> Any:
-        """The comparison of ``when``, its signal and wire, and whether it is truth; ``None`` without one, and false
-        after a problem."""
+        """Read the comparison of ``when``, its signal and wire, and whether it is truth; ``None``
+        without one, and false after a problem."""
         entry = self.node.get("when")
         if entry is None:
             return None
@@ -375,9 +375,9 @@ class _FaultReader:
         where = entry.value.where
         element = WireElement(where, FlatWire(port, where, truth=output.truth), Selection(field_name, selection.indices))  # fmt: skip
         wire = FlatWire(
-            "", where, delay=1, parts=(WirePart("", where, (element,)),), truth=output.truth
+            "", where, delay=1, slices=(WireSlice("", where, (element,)),), truth=output.truth
         )
-        signal = part_signal("Event", {field_name: ((), field.dtype_name)})
+        signal = selected_signal("Event", {field_name: ((), field.dtype_name)})
         return Comparison(SIGNS.index(match["sign"]), number), signal, wire, output.truth
 
     def _report(self, message: str, where: Position, code: Code = Code.BAD_VALUE, **details: Any) -> None:  # fmt: skip
@@ -385,28 +385,28 @@ class _FaultReader:
 
 
 def _moved(wire: FlatWire, source: str, target: str) -> FlatWire:
-    """The wire, or its parts, from another output where it came from ``source``."""
-    if wire.parts:
-        parts = tuple(
-            replace(part, items=tuple(
+    """Return the wire, or its parts, from another output where it came from ``source``."""
+    if wire.slices:
+        slices = tuple(
+            replace(wire_slice, items=tuple(
                 item if item.wire is None else replace(item, wire=_moved(item.wire, source, target))
-                for item in part.items
+                for item in wire_slice.items
             ))
-            for part in wire.parts
+            for wire_slice in wire.slices
         )  # fmt: skip
-        return replace(wire, parts=parts)
+        return replace(wire, slices=slices)
     if wire.constant is not None or wire.source != source:
         return wire
     return replace(wire, source=target, shown=wire.shown or source)
 
 
 def _element_names(settings: Settings) -> Mapping[str, tuple[str, ...]]:
-    """The names of elements by their dimension."""
+    """Return the names of elements by their dimension."""
     return {} if settings.robot is None else settings.robot.element_names
 
 
 def _number(text: str, field: Field) -> float | None:
-    """A number, a truth value, a name of the field's values, or a quantity in its unit."""
+    """Read a number, a truth value, a name of the field's values, or a quantity in its unit."""
     words = {"true": 1.0, "false": 0.0}
     if field.values is not None:
         words |= {each.name.lower(): float(each.value) for each in field.values}

@@ -10,7 +10,7 @@ import aloft
 from aloft.files.problems import LoadError
 from aloft.logs.replay.replay import KeptRun, Keyframes, replay
 from aloft.runtime.drawing.diagram import subgraphs
-from aloft.runtime.language.fault import chirp_lines
+from aloft.runtime.language.signal_error import chirp_lines
 from aloft.runtime.loading.picture import table
 from aloft.runtime.running.run_result import RunResult
 

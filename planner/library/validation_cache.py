@@ -1,4 +1,4 @@
-"""What follows from a plan and a robot alone, and is therefore computed once.
+"""Cache of results that depend only on a plan and a robot.
 
 A study runs the same jump many times in every worker; its plan is checked and turned into a table
 in the first of these runs only, and both are kept for later processes. What counts is the content of
@@ -32,20 +32,20 @@ FOLDERS = ("planner/checking", "planner/models", "planner/task", "robots", "math
 """The code that decides what the check finds."""
 
 
-def noted_folder() -> Path:
-    """Where it is noted that a plan has passed."""
+def notes_folder() -> Path:
+    """Return the folder of the notes that a plan has passed."""
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     return Path(home) / "aloft" / "checked"
 
 
-def unless_passed(content: bytes, check: Callable[[], None]) -> None:
+def check_unless_noted(content: bytes, check: Callable[[], None]) -> None:
     """Check a plan, unless one of that content has passed the very same check before.
 
     Args:
         content: a digest of the plan and of the robot.
         check: raises an error if the plan does not pass; then nothing is noted.
     """
-    note = noted_folder() / hashlib.blake2b(content + _code(), digest_size=16).hexdigest()
+    note = notes_folder() / hashlib.blake2b(content + _code(), digest_size=16).hexdigest()
     if note.is_file():
         return
     check()
@@ -61,9 +61,9 @@ def _code() -> bytes:
 
 
 KEPT = 32
-"""How many results are kept, of the plans used last."""
+"""Number of results that are kept, of the plans used last."""
 
-TABLE_FOLDERS = (*FOLDERS, "planner/library", "blocks/signals")
+TABLE_FOLDERS = (*FOLDERS, "planner/library")
 """The code that decides on a table."""
 
 _Result = TypeVar("_Result")
@@ -101,20 +101,21 @@ def content(plan: PlannedJump, robot: RobotDescription) -> bytes:
     return digest.digest()
 
 
-def require_valid_once(plan: PlannedJump, robot: RobotDescription) -> None:
-    """As ``require_valid``, but only the first time for the same plan, robot and check, in any process.
+def require_valid_cached(plan: PlannedJump, robot: RobotDescription) -> None:
+    """Check a plan as ``require_valid`` does, but only the first time for the same plan, robot and check, in any
+    process.
 
     Raises:
         InvalidPlanError: the plan is not valid.
     """
     key = content(plan, robot)
-    _valid.get(key, lambda: unless_passed(key, lambda: require_valid(plan, robot)))
+    _valid.get(key, lambda: check_unless_noted(key, lambda: require_valid(plan, robot)))
 
 
-def reference_table_once(
+def cached_reference_table(
     plan: PlannedJump, robot: RobotDescription, stand_time: float
 ) -> JumpTable:
-    """As ``reference_table``, which is made once. It is not to be written to."""
+    """Return the table of ``reference_table``, which is made once. It is not to be written to."""
     key = content(plan, robot), stand_time
 
     def make() -> JumpTable:

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from aloft.robots.description import RobotDescription, find_robot
-from aloft.robots.validation import RobotError, find_faults
+from aloft.robots.validation import RobotError, find_errors
 
 from .wrong_robots import WRONG_BODIES, Change, hopper
 from .wrong_stances import WRONG_STANCES
@@ -41,7 +41,7 @@ def test_every_wrong_robot_has_its_report(
     error = report(changed(changes), tmp_path)
     assert str(error).replace(f"{tmp_path}/", "").splitlines()[:-1] == lines
     assert error.file == str(tmp_path / "hopper.yaml")
-    assert len(error.faults) == sum(not line.startswith(" ") for line in lines)
+    assert len(error.errors) == sum(not line.startswith(" ") for line in lines)
 
 
 def test_joints_are_listed_branch_by_branch(tmp_path: Path) -> None:
@@ -77,12 +77,12 @@ def test_a_file_that_is_no_yaml(content: bytes, message: str, tmp_path: Path) ->
 
 def test_the_headline_counts(tmp_path: Path) -> None:
     error = report(changed([(("links", 0, "mass"), 0), (("base",), "bodi")]), tmp_path)
-    count = len(error.faults)
-    assert str(error).endswith(f"hopper.yaml: {count} faults in the robot's description")
+    count = len(error.errors)
+    assert str(error).endswith(f"hopper.yaml: {count} errors in the robot's description")
 
 
 def test_what_has_no_fault_can_be_read() -> None:
-    assert find_faults(hopper()) == ()
+    assert find_errors(hopper()) == ()
     assert RobotDescription.model_validate(hopper()).name == "hopper"
 
 
@@ -90,7 +90,7 @@ def test_what_has_no_fault_can_be_read() -> None:
     ("data", "found"), [(None, "nothing"), ([1, 2], "a list"), ("bruce", "a str"), (3.5, "a float")]
 )
 def test_what_is_no_mapping_describes_no_robot(data: object, found: str) -> None:
-    (fault,) = find_faults(data)
+    (fault,) = find_errors(data)
     assert fault.message == "this describes no robot" and fault.found == found
 
 
@@ -103,11 +103,11 @@ def with_mesh(link: str = "body", **values: list[float]) -> dict[str, Any]:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_mesh_may_be_turned_by_any_quaternion_but_zero(place: int, sign: float) -> None:
     orientation = [0.0] * 4
-    (fault,) = find_faults(with_mesh(orientation=orientation))
+    (fault,) = find_errors(with_mesh(orientation=orientation))
     assert fault.path == ("looks", "body", "meshes", 0, "orientation")
     assert fault.fix == "orientation: [0, 0, 0, 1]"
     orientation[place] = sign
-    assert find_faults(with_mesh(orientation=orientation)) == ()
+    assert find_errors(with_mesh(orientation=orientation)) == ()
 
 
 @pytest.mark.parametrize(("key", "size"), [("position", 3), ("orientation", 4), ("scale", 3)])
@@ -116,11 +116,11 @@ def test_the_numbers_of_a_mesh_are_finite(key: str, size: int, value: float) -> 
     for place in range(size):
         numbers = [1.0] * size
         numbers[place] = value
-        (fault,) = find_faults(with_mesh(**{key: numbers}))
+        (fault,) = find_errors(with_mesh(**{key: numbers}))
         assert fault.path == ("looks", "body", "meshes", 0)
 
 
 def test_the_link_of_a_look_is_one_of_the_links() -> None:
-    (fault,) = find_faults(with_mesh("bodi"))
+    (fault,) = find_errors(with_mesh("bodi"))
     assert fault.path == ("looks", "bodi")
-    assert find_faults(with_mesh()) == ()
+    assert find_errors(with_mesh()) == ()
