@@ -13,8 +13,8 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from ...robots.description import RobotDescription
+from ...robots.terrain import Terrain
 from ...runtime.language.parameters import Parameters, parameter
-from ...runtime.language.terrain import Terrain
 from ..drive_control import DriveGains
 from . import scenes
 from .effects import (

@@ -38,7 +38,6 @@ from .external_forces import ExternalForces
 from .gantry import Gantry
 from .gears import YieldingGears
 from .imu_effects import ImuModel
-from .joint_effects import falling_friction
 from .mujoco_model import body_name, build_world, number_of_soles
 from .parameters import SimulatorParameters
 from .physics_step import step_calls
@@ -61,6 +60,7 @@ from .state import (
     read_encoders,
     record_step,
 )
+from .stribeck import falling_friction
 from .switch_effects import SwitchDelays
 from .truth import TruthReport
 from .variation import Variation, draw_variation

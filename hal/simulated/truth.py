@@ -17,8 +17,8 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.ground_surface import Surface, height_of_ground
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
+from ...robots.terrain import Terrain
 from ...runtime.language.steps import signal_call
-from ...runtime.language.terrain import Terrain
 from .base import FixedBase
 from .stance import depth_of_contacts
 from .state import TickRecord

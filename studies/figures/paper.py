@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image as Picture
 
     from ...robots.description import RobotDescription
-    from ...runtime.language.terrain import Terrain
+    from ...robots.terrain import Terrain
     from ..expansion import Cell
     from ..summary import StudyRow
     from .trace import Trace

@@ -17,7 +17,7 @@ from aloft.logs.viewing.plot_views import limits_of
 from aloft.logs.viewing.scene_ports import OTHERS, PUSH, ROLES, PoseSource, port_of, scene_ports
 from aloft.logs.viewing.state_lanes import lanes_of, times_table
 from aloft.robots.description import find_robot
-from aloft.runtime.language.terrain import Ground, Terrain
+from aloft.robots.terrain import Ground, Terrain
 from aloft.runtime.running.memory import BoundGraph
 
 GRAPH = Path(__file__).parents[3] / "graphs" / "jump.yaml"

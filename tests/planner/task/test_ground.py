@@ -10,7 +10,7 @@ from aloft.planner.task.ground import scene_of
 from aloft.planner.task.sequence import ground_axes
 from aloft.planner.task.task import JumpTaskError, make_task
 from aloft.robots.description import find_robot
-from aloft.runtime.language.terrain import Terrain
+from aloft.robots.terrain import Terrain
 
 BRUCE = find_robot("bruce")
 

@@ -5,7 +5,7 @@ import pytest
 
 from aloft.hal.simulated.scenes import step
 from aloft.robots.description import find_robot
-from aloft.runtime.language.terrain import Terrain
+from aloft.robots.terrain import Terrain
 from aloft.studies.figures import offscreen
 from aloft.studies.figures.offscreen import NoRendererError, Offscreen, View
 from aloft.studies.figures.strip import Moment, Motion, draw_strip, moments_of

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from aloft.hal.simulated.effects import JointEffects, longest_stribeck_step
-from aloft.hal.simulated.joint_effects import falling_friction
 from aloft.hal.simulated.parameters import SimulatorParameters
+from aloft.hal.simulated.stribeck import falling_friction
 from aloft.hal.simulated.variation import draw_variation
 from aloft.robots.description import find_robot
 
