@@ -87,7 +87,7 @@ class FixedBase:
     def refresh(self) -> None:
         """Bring ``angular_velocity`` up to date."""
 
-    def refreshing(self) -> list[KernelCall]:
+    def refresh_calls(self) -> list[KernelCall]:
         """Return the calls of ``refresh``."""
         return []
 
@@ -129,7 +129,7 @@ class PlanarBase(FixedBase):
         """Bring ``angular_velocity`` up to date."""
         read_pitch_rate(self._data.qvel, self.angular_velocity)
 
-    def refreshing(self) -> list[KernelCall]:
+    def refresh_calls(self) -> list[KernelCall]:
         """Return the calls of ``refresh``."""
         return [KernelCall(read_pitch_rate, self._data.qvel, self.angular_velocity)]
 

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...blocks.signals import ExternalForce
-from ...mathematics.arrays import Array1D, Array2D, Flags1D, Indices0D, Indices1D, Vector3
+from ...mathematics.arrays import Array1D, Array2D, Counts, Flags1D, Indices0D, Indices1D, Vector3
 from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
+from .effect import Effect
+from .effects import CableParameters
 from .mujoco_model import body_name
-from .parameters import SimulatorParameters
 from .variation import draw_pull
 
 if TYPE_CHECKING:
@@ -75,7 +76,6 @@ class ExternalForces:
 
     def __init__(self, model: MjModel, data: MjData, robot: RobotDescription) -> None:
         self._robot = robot
-        self._base = int(model.body(body_name(robot.base)).id)
         sites = [int(model.site(f"point/{name}").id) for name in robot.points]
         bodies = [int(model.body(body_name(link)).id) for link, _ in robot.points.values()]
         self._points = PushPoints(
@@ -83,21 +83,13 @@ class ExternalForces:
             data.xfrc_applied, np.zeros(1, np.bool_),
         )  # fmt: skip
 
-    def releasing(self) -> KernelCall:
-        """Nothing acts any more."""
+    def release_call(self) -> KernelCall:
+        """Return the call that clears all external forces."""
         return KernelCall(clear_wrenches, self._points.wrenches)
 
-    def pushing(self, push: ExternalForce) -> KernelCall:
-        """The push acts in the next physics step; ``check`` says whether it has a point."""
+    def push_call(self, push: ExternalForce) -> KernelCall:
+        """Return the call by which the push acts in the next physics step; ``check`` says whether it has a point."""
         return KernelCall(apply_push, push.force, push.point, self._points)
-
-    def pulling(self, params: SimulatorParameters) -> list[Call]:
-        """In every physics step, what a cable does: the first call goes before that of a push, which
-        it makes begin anew, the second after it."""
-        assert params.body.cable is not None
-        base = self._points.wrenches[self._base, :3]
-        force = np.array(draw_pull(params.body.cable, params.seed, self._robot))
-        return [self.releasing(), KernelCall(add_force, force, base)]
 
     def check(self, push: ExternalForce) -> None:
         """Raise ``IndexError`` if the push has acted at a point that the robot does not have."""
@@ -107,3 +99,26 @@ class ExternalForces:
                 f"push at point {int(push.point)}; {self._robot.name} has "
                 f"{len(self._points.sites)}: " + ", ".join(self._robot.points)
             )
+
+
+class Cable(Effect):
+    """A cable that pulls at the base of a robot that stands: a constant force, drawn by the seed.
+
+    Args:
+        params: of the cable.
+        seed: draws its direction.
+        robot: the description.
+        model, data: the simulator's.
+    """
+
+    def __init__(
+        self, params: CableParameters, seed: int, robot: RobotDescription, model: MjModel, data: MjData,
+    ) -> None:  # fmt: skip
+        base = int(model.body(body_name(robot.base)).id)
+        self._pull = KernelCall(
+            add_force, np.array(draw_pull(params, seed, robot)), data.xfrc_applied[base, :3]
+        )
+
+    def force_calls(self, step: Counts, *, stands: bool) -> list[Call]:
+        """Let the cable pull once the robot stands."""
+        return [self._pull] if stands else []

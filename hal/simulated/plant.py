@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
@@ -29,15 +29,14 @@ from ..drive_control import correcting
 from ..random_streams import Purpose, RandomStreams, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
-from .battery import Battery, spread_voltage
+from .battery import Battery
+from .chosen_effects import chosen_effects, effect_dimensions
 from .contact_bias import ContactBias
-from .drive_effects import DriveEffects
+from .drive_effects import drive_lag
 from .drives import MotorLimits
-from .effects import SwitchEffects
+from .effect import Effect, StepViews
 from .external_forces import ExternalForces
 from .gantry import Gantry
-from .gears import YieldingGears
-from .imu_effects import ImuModel
 from .mujoco_model import body_name, build_world, number_of_soles
 from .parameters import SimulatorParameters
 from .physics_step import step_calls
@@ -60,15 +59,15 @@ from .state import (
     read_encoders,
     record_step,
 )
-from .stribeck import falling_friction
-from .switch_effects import SwitchDelays
 from .truth import TruthReport
 from .variation import Variation, draw_variation
-from .windings import NOMINAL, read_temperatures
+from .windings import NOMINAL, Windings
 
 if TYPE_CHECKING:
     from mujoco import MjData
 
+
+Kind = TypeVar("Kind", bound=Effect)
 
 SETTLING_TIME, OBSERVED_TIME = 0.3, 0.02
 """How long a robot settles before it is checked whether it stands, and the last part of it, in which the load is averaged [s]."""
@@ -110,7 +109,7 @@ class Plant:
         sensors: what makes readings of the true motion.
         stiffness, damping: the gains [N m/rad, N m s/rad] (n_joints,) that hold the standing pose.
         position, velocity: the true joint motion [rad, rad/s], views of the simulator's memory.
-        sensed: what the encoders make of both, without their offsets.
+        effects: what is not ideal, in the order in which a physics step has it.
         clearing: begins a new record, except for the memory of the switches.
         forces: what acts on the robot from outside.
         step1, step2: the two parts of a physics step, see ``step_calls``.
@@ -136,30 +135,11 @@ class Plant:
         self.streams = RandomStreams(params.seed_of_noise, _noisy_fields(robot))
         self.sensors = SimulatedSensors(robot, params, self.streams, sensed)
         self._samples_per_tick = samples_per_tick
-        self.imu = None
-        if not params.sensors.imu.ideal:
-            self.imu = ImuModel(params.sensors.imu, params.seed, params.timestep, physics)
-        self.drives = DriveEffects(
-            robot, params.sensors.encoders, params.actuators.motors, params.seed, params.timestep, physics,
-            params.actuators.windings,
-        )  # fmt: skip
-        self.windings, self.battery = self.drives.windings, None
-        if params.actuators.battery is not None:
-            warm = None if self.windings is None else self.windings.warm
-            self.battery = Battery(params.actuators.battery, robot, params.timestep, physics, warm)
-        self.switches = None
-        if params.sensors.switches != SwitchEffects():
-            self.switches = SwitchDelays(params.sensors.switches, params.timestep, physics)
-        self.gears = None
-        if params.actuators.gears is not None:
-            rotors = self.variation.rotors(robot)
-            self.gears = YieldingGears(
-                params.actuators.gears, robot, rotors, params.timestep, physics
-            )
         whole = self.model
         if params.actuators.gears is not None:
             whole = build_world(params, robot, replace(self.variation, rotor_share=1.0))
-        self.stiffness, self.damping = holding_gains(whole, robot, self.drives.lag)
+        lag = drive_lag(params.sensors.encoders, params.actuators.motors)
+        self.stiffness, self.damping = holding_gains(whole, robot, lag)
         self._passive = passive_joints(robot)
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
         self._encoder = np.zeros(len(robot.joints))
@@ -178,20 +158,7 @@ class Plant:
             "n_integration": mujoco.mj_stateSize(model, everything),
             "n_random": RandomStreams(params.seed_of_noise, _noisy_fields(robot)).words,
             **SimulatedSensors.dimensions(params, mounted_sensors(robot)),
-            **ImuModel.dimensions(params.sensors.imu, params.timestep),
-            **DriveEffects.dimensions(
-                robot,
-                params.sensors.encoders,
-                params.actuators.motors,
-                params.timestep,
-                params.actuators.windings,
-            ),
-            "n_rotors": 0 if params.actuators.gears is None else len(robot.joints),
-            "n_gantry": 0 if params.start.gantry is None else 4,
-            "n_battery": 0 if params.actuators.battery is None else 4,
-            "n_late_switches": 0
-            if params.sensors.switches == SwitchEffects()
-            else len(robot.contacts),
+            **effect_dimensions(params, robot),
         }
 
     def _attach(self, data: MjData) -> None:
@@ -209,47 +176,47 @@ class Plant:
         self.truth = TruthReport(
             data, base, self._robot, self._params.build_scene(self._robot), self.record
         )
-        sensors, physics = self.sensors, self.physics
-        self._torque = data.ctrl[: len(self._robot.joints)]  # those of thrusters follow
-        force, contacts = data.sensor("accelerometer").data, data.sensor("contacts").data
-        self._rate = base.angular_velocity
-        self._sensing: list[Call] = []
-        if self.imu is not None:
-            self._sensing += [*base.refreshing(), self.imu.sensing(self._rate, force)]
-            self._rate, force = self.imu.rate, self.imu.force
-        self.sensed = self.position, self.velocity
-        self._seeing: list[Call] = []
-        if self.switches is not None:
-            self._seeing.append(self.switches.settling(self.record.closed))
-        if self.gears is not None:
-            self._seeing.append(self.gears.sensing())
-            self.sensed = self.gears.position, self.gears.velocity
-        self._turning = self.sensed[1]  # at what speed the motors turn, as joints
-        if self.drives.has_encoders:
-            self._seeing.append(self.drives.sensing(*self.sensed, self._torque))
-            self.sensed = physics.encoder_position, physics.encoder_velocity
-        self._note = signal_call(
-            record_step, self.physics.step, StepSensors(load, soles, force, contacts, self.position),
-            *self._limits, sensors.ground_force, sensors.bounce_steps, self.record,
+        joints = len(self._robot.joints)
+        views = StepViews(
+            base, self.position, self.velocity, data.ctrl[:joints],  # those of thrusters follow
+            self.position, self.velocity, self.velocity, base.angular_velocity,
+            data.sensor("accelerometer").data, self.record.closed,
         )  # fmt: skip
-        self._encoding = KernelCall(
-            read_encoders, self.sensed[0], sensors.encoder_offset, self._encoder
+        self.effects = chosen_effects(
+            self._params, self._robot, self.variation, model, data, base, self.physics
+        )
+        self._motion_calls: list[Call] = []
+        self._model_calls: list[Call] = []
+        self._reading_calls: list[Call] = []
+        for effect in self.effects:
+            self._motion_calls += effect.motion_calls(views)
+            self._model_calls += effect.model_calls(views)
+            self._reading_calls += effect.reading_calls(views)
+            views = effect.seen(views)
+        self._views = views
+        seen = StepSensors(load, soles, views.force, data.sensor("contacts").data, self.position)
+        self._record_call = signal_call(
+            record_step, self.physics.step, seen, *self._limits, self.sensors.ground_force,
+            self.sensors.bounce_steps, self.record,
+        )  # fmt: skip
+        self._encoder_call = KernelCall(
+            read_encoders, views.angle, self.sensors.encoder_offset, self._encoder
         )
         self.step1, self.step2 = step_calls(model, data)
         if self._params.ground.contact_bias:
             self.step1 = ForeignCall(ContactBias(model, data).begin_step, 0)
-        self._falling: list[Call] = []
-        if self.variation.static_friction:
-            self._falling.append(falling_friction(
-                self.velocity, model.dof_frictionloss[base.velocities :],
-                self.variation.static_friction, self._params.actuators.joints.stribeck_velocity,
-            ))  # fmt: skip
         self.forces = ExternalForces(model, data, self._robot)
-        self.gantry = None
-        if self._params.start.gantry is not None and base.velocities:
-            self.gantry = Gantry(
-                self._params.start.gantry, self._robot, model, data, physics, self._params.timestep
-            )
+        self.gantry = self._effect(Gantry)
+        self.battery, self.windings = self._effect(Battery), self._effect(Windings)
+
+    def _effect(self, kind: type[Kind]) -> Kind | None:
+        """Return the effect of a kind; ``None`` if there is none."""
+        return next((effect for effect in self.effects if isinstance(effect, kind)), None)
+
+    @property
+    def sensed(self) -> tuple[Array, Array]:
+        """The encoders' reading of the joint motion [rad, rad/s], without their offsets."""
+        return self._views.angle, self._views.speed
 
     def stand(self, step: CallSequence, hold: Callable[[Array, Array], None]) -> None:
         """Stand on the ground and settle, up to the first instant of the control clock.
@@ -278,10 +245,10 @@ class Plant:
         if self.gantry is not None and params.start.gantry is not None:
             base.shift(np.array([0.0, 0.0, params.start.gantry.height]))
             mujoco.mj_kinematics(model, data)
-            self.gantry.begin()
+            self.gantry.tie()
         rotation = data.body(body_name(robot.base)).xmat.reshape(3, 3).copy()
         pose = self.position.copy()
-        self._begin_sensing()
+        self._begin_effects()
         hangs = self.gantry is not None
         torque = holding_torque(model, data, base, robot, hangs)
         hold(self.position + self.sensors.encoder_offset, torque)
@@ -311,20 +278,12 @@ class Plant:
         if self.gantry is not None:
             self.gantry.lower(self.physics.step)
 
-    def _begin_sensing(self) -> None:
-        """Let encoders and IMU begin anew."""
-        self.physics.encoder_taken[0] = self.physics.imu_taken[0] = 0
-        self.physics.encoder_play.fill(0.0)
-        if self.battery is not None:
-            self.battery.begin()
-        if self.windings is not None:
-            self.windings.begin()
-        if self.gears is not None:
-            self.gears.begin(self.position)
-        if self.switches is not None:
-            self.switches.begin()
+    def _begin_effects(self) -> None:
+        """Let all effects begin anew, and read the pose."""
+        for effect in self.effects:
+            effect.begin(self.position)
         self.step1.run()
-        for call in self._seeing:
+        for call in self._reading_calls:
             call.run()
 
     def _settle(self, step: CallSequence, steps: int) -> None:
@@ -346,38 +305,22 @@ class Plant:
         ``push`` is a force from outside, held for all these steps; see ``forces.check``. With it the cable
         pulls, too: it is put on when the robot stands. ``thrusters`` are what those do in every step.
         """
-        step, torque, turning = self.physics.step, self._torque, self._turning
-        feeds = [each for each in (self.windings, self.battery) if each is not None]
+        step, views, limits = self.physics.step, self._views, drives.limits
+        stands = push is not None
+        added = [c for each in self.effects for c in each.force_calls(step, stands=stands)]
         one: list[Call] = [
-            self._encoding,
-            *(each.limiting(drives.limits) for each in feeds),
-            drives.torque_call(step, self._encoder, self.sensed[1], turning, torque),
+            self._encoder_call,
+            *(c for each in self.effects for c in each.limit_calls(limits)),
+            drives.torque_call(step, self._encoder, views.speed, views.turning, views.torque),
             *thrusters,
-        ]
-        if self.windings is not None:
-            one.append(self.windings.heating(drives.limits))
-        if self.battery is not None:
-            one.append(self.battery.feeding(drives.limits))
-        if self.drives.has_motors:
-            requested = drives.limits.motor_torque
-            one.append(self.drives.producing(self.position, turning, requested, torque))
-        if self.gears is not None:
-            one.append(self.gears.turning(self.position, self.velocity, torque))
-        if self.gantry is not None:
-            one.append(self.forces.releasing())
-        if push is not None and self._params.body.cable is not None:
-            release, pull = self.forces.pulling(self._params)
-            one += [release, self.forces.pushing(push), pull]
-        elif push is not None:
-            one.append(self.forces.pushing(push))
-        if self.gantry is not None:
-            one.append(self.gantry.pulling(step))
-        one += [
-            self.step2, *self._sensing, self._note, *self.sensors.after_step(), *self._falling,
-            self.step1,
-            *self._seeing,
+            *(c for each in self.effects for c in each.torque_calls(views, limits)),
+            *([self.forces.release_call()] if added else []),
+            *([] if push is None else [self.forces.push_call(push)]),
+            *added,
+            self.step2, *self._motion_calls, self._record_call, *self.sensors.after_step(),
+            *self._model_calls, self.step1, *self._reading_calls,
         ]  # fmt: skip
-        return CallSequence([self.forces.releasing(), *(one * steps)])
+        return CallSequence([self.forces.release_call(), *(one * steps)])
 
     def reading(self, imu: ImuReading, joints: JointState) -> list[Call]:
         """Write a sample of the IMU, the gyroscope of this instant and the mean of the accelerometer
@@ -397,12 +340,12 @@ class Plant:
         [m/s^2, body] as the accelerometer's."""
         base = self._base
         return [
-            *base.refreshing(), *self.sensors.reading_imu(self._rate, force, imu)
+            *base.refresh_calls(), *self.sensors.reading_imu(self._views.rate, force, imu)
         ]  # fmt: skip
 
     def reading_switches(self, closed: Flags) -> list[Call]:
         """Write a sample of the switches, (n_contacts,)."""
-        pressed = self.record.closed if self.switches is None else self.switches.closed
+        pressed = self._views.closed
         return self.sensors.reading_switches(self.physics.step, self.record, pressed, closed)
 
     def clear_record(self) -> None:
@@ -426,20 +369,13 @@ class Plant:
             self.model, self.data, self.physics.integration, mujoco.mjtState.mjSTATE_INTEGRATION
         )
         self.streams.load(self.physics.random)
-        for call in (*self._falling, self.step1):
+        restored = [call for effect in self.effects for call in effect.restore_calls()]
+        for call in (*self._model_calls, self.step1, *restored):
             call.run()
-        if self.gears is not None:
-            self.gears.sensing().run()
 
     def reporting_drives(self, health: RobotHealth) -> list[Call]:
         """Write the pack's voltage and the windings' temperatures to all drives, where they are simulated."""
-        found: list[Call] = []
-        if self.battery is not None:
-            found.append(KernelCall(spread_voltage, self.battery.voltage, health.voltage))
-        if self.windings is not None:
-            temperatures = self.physics.winding_temperature
-            found.append(KernelCall(read_temperatures, temperatures, health.temperature))
-        return found
+        return [call for effect in self.effects for call in effect.health_calls(health)]
 
     def voltage(self, supply: float) -> float:
         """The voltage of the pack [V], or of the ``supply`` where none is simulated."""
@@ -466,13 +402,7 @@ class Plant:
                 if number_of_soles(self.model)
                 else {}
             ),
-            **({} if self.imu is None else self.imu.metrics()),
-            **(self.drives.metrics() if self.drives.has_motors else {}),
-            **(
-                {"robot_hottest_winding_degc": float(self.physics.winding_temperature.max())}
-                if self.windings is not None
-                else {}
-            ),
+            **{name: value for each in self.effects for name, value in each.metrics().items()},
             **self.variation.metrics(),
         }
 

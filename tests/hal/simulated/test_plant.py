@@ -9,6 +9,7 @@ import pytest
 
 from aloft.hal.random_streams import Purpose
 from aloft.hal.simulated import physics_step
+from aloft.hal.simulated.drives import MotorLimits
 from aloft.hal.simulated.external_forces import PushPoints, apply_push, clear_wrenches
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.hal.simulated.parameters import SimulatorParameters
@@ -31,6 +32,7 @@ class HoldingDrives:
 
     def __init__(self, plant: Plant) -> None:
         self.plant = plant
+        self.limits = MotorLimits(ROBOT, plant.record)
         self.steps: list[int] = []
 
     def hold(self, position: Array, torque: Array) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from aloft.hal.simulated.effects import JointEffects, longest_stribeck_step
 from aloft.hal.simulated.parameters import SimulatorParameters
-from aloft.hal.simulated.stribeck import falling_friction
+from aloft.hal.simulated.stribeck import friction_call
 from aloft.hal.simulated.variation import draw_variation
 from aloft.robots.description import find_robot
 
@@ -40,7 +40,7 @@ def turned(torque: float, seconds: float, speed: float = 0.0) -> float:
 
     model, data = flywheel()
     data.qvel[0] = speed
-    falling = falling_friction(data.qvel, model.dof_frictionloss, (STATIC,), SPEED)
+    falling = friction_call(data.qvel, model.dof_frictionloss, (STATIC,), SPEED)
     for _ in range(round(seconds / model.opt.timestep)):
         falling.run()
         mujoco.mj_step1(model, data)

@@ -155,9 +155,9 @@ def test_switches_close_late_and_open_later() -> None:
     memory = PhysicsState.allocate({**SIZES, "n_late_switches": 2})
     effects = SwitchEffects.model_validate({"debounce": 0.002, "sticking": 0.003})
     switches = SwitchDelays(effects, step, memory)
-    switches.begin()
+    switches.begin(np.zeros(len(ROBOT.joints)))
     pressed = np.array([False, False])
-    call = switches.settling(pressed)
+    call = switches.settle_call(pressed)
     seen = []
     for k in range(60):
         pressed[0] = 10 <= k < 30
