@@ -76,8 +76,8 @@ plans: $(COMPLETE)  ## make the shipped plans anew, one for every file in graphs
 
 docs: $(COMPLETE)  ## make what is generated under docs/
 	@$(BIN)/aloft blocks --markdown > docs/blocks.md
-	@$(BIN)/python docs/refresh.py
-	@$(BIN)/python docs/make_pictures.py
+	@$(BIN)/python lab/pages/refresh.py
+	@$(BIN)/python lab/pages/make_pictures.py
 
 site: $(COMPLETE)  ## build the documentation as a site in site/, which any web server serves; other versions there stay
 	@$(BIN)/python -m sphinx -q --fail-on-warning --keep-going -c docs -d build/doctrees . \
@@ -85,10 +85,10 @@ site: $(COMPLETE)  ## build the documentation as a site in site/, which any web 
 	@echo "site/index.html"
 
 demo: $(COMPLETE)  ## build the page on which BRUCE jumps in a browser in site/demo; needs npm and wasm-ld
-	@$(BIN)/python docs/demo/build.py site/demo
+	@$(BIN)/python extensions/export/demo/build.py site/demo
 
 notebooks: $(COMPLETE)  ## write the notebooks of the gallery, with the files that they use, into site/notebooks
-	@$(BIN)/python docs/notebooks.py site/notebooks
+	@$(BIN)/python lab/pages/notebooks.py site/notebooks
 
 release: $(COMPLETE)  ## build sdist and wheel into dist/, try the wheel alone, sign it (SIGN=KEY); publish nothing
 	@sh scripts/release.sh

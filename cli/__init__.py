@@ -32,7 +32,6 @@ def main() -> None:
 
 def make_app(verbs: Iterable[str] | None = None) -> typer.Typer:
     """Make the command line with those verbs, or with all; the files of others are not imported."""
-    from .app import VERBS
-    from .app import make_app as resolve_composite_wires
+    from . import app
 
-    return resolve_composite_wires(VERBS if verbs is None else verbs)
+    return app.make_app(app.all_verbs() if verbs is None else verbs)

@@ -14,7 +14,7 @@ import typer
 
 from .. import __version__
 from ..runtime.language.errors import ExitCode
-from .shared.output import print_json
+from .shared.output import print_error, print_json
 
 EXIT_CODES = """\b
 Exit codes:
@@ -29,22 +29,28 @@ Exit codes:
 """
 
 VERBS = (
-    "new", "run", "jump", "stand", "steer", "view", "render", "plot", "replay", "branch", "explain", "check", "graph", "graphs", "blocks", "plan", "bench", "study", "tune", "falsify", "test", "params", "export", "linearise", "trim",
-    "keys", "deploy", "top", "watch", "log", "robot", "twin", "doctor", "language-server",
+    "run", "check", "graph", "blocks", "new", "test", "params", "view", "plot", "render", "log", "replay", "study",
+    "plan", "jump", "robot", "twin", "doctor",
 )  # fmt: skip
-"""All verbs, in the order of the help. The file of each has its name, and so has what it offers:
-a command, or a group of commands."""
+"""The verbs of the core, in the order of the help. The file of each has its name, and so has what it
+offers: a command, or a group of commands. Extensions declare theirs; see ``runtime.language.extensions``."""
 
-IN_FILE_OF = {"graphs": "check", "doctor": "check", "watch": "top"}
+IN_FILE_OF = {"doctor": "check"}
 """Short verbs that stand in the file of another."""
 
+GROUPS = ("robot",)
+"""The groups of the core to which extensions may add verbs, declared as ``robot reach``."""
 
-ONLY_READ = ("check", "graph", "graphs", "blocks")
+ONLY_READ = ("check", "graph", "blocks")
 """The verbs that leave nothing to be closed at the end of the process."""
 
 
 def make_app(verbs: Iterable[str] = VERBS) -> typer.Typer:
-    """Make the command line with those verbs; the files of others are not imported."""
+    """Make the command line with those verbs; the files of others are not imported.
+
+    Raises:
+        ExtensionError: an extension's declaration is wrong.
+    """
     app = typer.Typer(
         name="aloft",
         help="Run, check and look at graphs of blocks.",
@@ -54,19 +60,68 @@ def make_app(verbs: Iterable[str] = VERBS) -> typer.Typer:
         rich_markup_mode=None,
     )
     for verb in verbs:
-        name = verb.replace("-", "_")
-        offered = getattr(import_module(f".{IN_FILE_OF.get(verb, name)}", __package__), name)
+        offered = _of_the_core(verb) if verb in VERBS else _of_extensions(verb)
         if isinstance(offered, typer.Typer):
             app.add_typer(offered)
-        else:
-            app.command(epilog=EXIT_CODES if verb == "run" else None)(offered)
+        elif offered is not None:
+            app.command(verb, epilog=EXIT_CODES if verb == "run" else None)(offered)
     app.callback()(_options)
     return app
 
 
-def asked_for(arguments: list[str]) -> tuple[str, ...]:
+def _of_the_core(verb: str) -> Any:
+    offered = getattr(import_module(f".{IN_FILE_OF.get(verb, verb)}", __package__), verb)
+    if verb in GROUPS:
+        from ..runtime.language.extensions import extensions
+
+        for each in extensions():
+            for name, target in each.verbs.items():
+                group, _, inner = name.partition(" ")
+                if group == verb and inner:
+                    found = each.load(target)
+                    if isinstance(found, typer.Typer):
+                        offered.add_typer(found, name=inner)
+                    else:
+                        offered.command(inner)(found)
+    return offered
+
+
+def _of_extensions(verb: str) -> Any:
+    from ..runtime.language.extensions import extensions
+
+    for each in extensions():
+        if verb in each.verbs:
+            return each.load(each.verbs[verb])
+    return None
+
+
+def chosen_verbs(arguments: list[str]) -> tuple[str, ...]:
     """Return the verb that a command line begins with, or all of them where it begins otherwise."""
-    return (arguments[0],) if arguments and arguments[0] in VERBS else VERBS
+    if arguments and arguments[0] in VERBS:
+        return (arguments[0],)
+    return (arguments[0],) if arguments and arguments[0] in _extension_verbs() else all_verbs()
+
+
+def all_verbs() -> tuple[str, ...]:
+    """Return the verbs of the core and of the extensions that are here."""
+    return (*VERBS, *_extension_verbs())
+
+
+def _extension_verbs() -> tuple[str, ...]:
+    from ..runtime.language.extensions import extensions
+
+    return tuple(verb for each in extensions() for verb in each.verbs if " " not in verb)
+
+
+def _why_unknown(arguments: list[str]) -> str:
+    """Return the sentence about a verb of an extension that is not here; empty for any other."""
+    from ..runtime.language.extensions import SHIPPED, missing_extension, own_extensions
+
+    for name, verbs in SHIPPED.items():
+        for verb in verbs:
+            if name not in own_extensions() and verb.split() == arguments[: len(verb.split())]:
+                return missing_extension(name, f"'aloft {verb}'")
+    return ""
 
 
 def _print_version(wanted: bool) -> None:
@@ -94,11 +149,14 @@ def main() -> None:
     # typer exports only the most special of the errors that a wrong command line raises
     usage_error = cast("type[Exception]", typer.BadParameter.__bases__[0])
     try:
-        code = make_app(asked_for(sys.argv[1:]))(standalone_mode=False)
+        code = make_app(chosen_verbs(sys.argv[1:]))(standalone_mode=False)
     except usage_error as caught:
         error: Any = caught
+        reason = _why_unknown(sys.argv[1:])
         if "--json" in sys.argv:
-            print_json({"success": False, "reason": error.format_message()})
+            print_json({"success": False, "reason": reason or error.format_message()})
+        elif reason:
+            print_error(reason)
         else:
             error.show()
         code = ExitCode.BAD_INPUT

@@ -56,13 +56,16 @@ def reference(name: str) -> BlockReference:
 
 def all_references(*, ours: bool = False) -> list[BlockReference]:
     """Return the contracts of all blocks by name; ``ours`` leaves out those of installed packages."""
+    from ..runtime.language.extensions import own_extensions
     from ..runtime.language.reference import block_reference
     from ..runtime.language.registry import PACKAGES, all_blocks
+
+    packages = (*PACKAGES, *own_extensions())
 
     return [
         block_reference(name, block_type)
         for name, block_type in all_blocks().items()
-        if not ours or name.partition(".")[0] in PACKAGES
+        if not ours or name.partition(".")[0] in packages
     ]
 
 

@@ -20,7 +20,7 @@ def check(
     ] = False,
 ) -> None:
     """Report every mistake in a graph at once: where, what is expected, what is found, the fix."""
-    from ..runtime.loading import load
+    from ..runtime.loading import checked_file
 
     if schema:
         from ..runtime.loading.schema import schema_text
@@ -30,7 +30,7 @@ def check(
     if graph is None:
         raise typer.BadParameter("a graph file is needed, or --schema")
     with errors_reported(as_json):
-        checked = load(graph, overrides or [])
+        checked = checked_file(graph, overrides or [])
     warnings: list[str] = []
     if checked.machines:
         from ..runtime.transports.registry import open_endpoints
@@ -47,22 +47,6 @@ def check(
         count, machines = len(checked.blocks), len(checked.machines)
         spread = f" on {machines} machine{'s' if machines > 1 else ''}" if machines else ""
         typer.echo(f"{graph}: no problems; {count} blocks at {checked.base_rate:g} Hz{spread}")
-
-
-def graphs(
-    as_json: AsJson = False,
-) -> None:
-    """List the shipped graphs by the addresses that every verb takes: aloft run aloft:jump."""
-    from ..runtime.loading.reading.files import shipped_graphs, summary
-
-    found = [(address, str(path), summary(path)) for address, path in shipped_graphs().items()]
-    if as_json:
-        keys = ("graph", "file", "summary")
-        print_json({"graphs": [dict(zip(keys, row, strict=True)) for row in found]})
-        return
-    out = console()
-    out.print(table("", ("graph", "what it does"), [(row[0], row[2]) for row in found]))
-    say(out, "aloft run aloft:jump runs one; aloft graph aloft:jump --flat prints it whole")
 
 
 def doctor(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +17,7 @@ from .shared.running_graphs import As, Keys, Local
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..runtime.drawing.page import Values
+    from ..logs.replay.opened_run import TickValues
     from ..runtime.language.stages import CheckedGraph
 
 
@@ -64,7 +64,7 @@ def graph(
     graph: Annotated[
         Path | None,
         typer.Argument(
-            help="The graph file, or a recording, for its graph. Not needed with --live."
+            help="The graph file, or a recording, for its graph; without one the shipped graphs are listed."
         ),
     ] = None,
     overrides: CompletedOverrides = None,
@@ -83,7 +83,8 @@ def graph(
     then. With --live the page shows a running graph: values, times of blocks and what is late, now; of a
     graph on several machines all parts, with --keys, --as and --local as for `aloft top`.
     """
-    from ..runtime.loading import load, picture
+    from ..runtime.language.extensions import provided
+    from ..runtime.loading import checked_file, picture
     from ..runtime.placement.placed import placement_json, split_over_machines
 
     shown = form.web or showing.live
@@ -91,9 +92,12 @@ def graph(
         if form.as_table + form.mermaid + form.flat + form.as_json + shown > 1:
             raise AloftError("choose one of --table, --mermaid, --flat, --json and --web")
         if showing.live:
-            serve_running(
+            provided("live_page")(
                 graph, showing.running, overrides or [], showing.keys, showing.name, showing.local
             )
+            return
+        if graph is None and not showing.running and not (form.svg or form.png or shown):
+            print_shipped(as_json=form.as_json)
             return
         if graph is None or showing.running:
             raise AloftError(
@@ -101,15 +105,15 @@ def graph(
                 if graph
                 else "give a graph file, or --live for one that runs"
             )
-        values: Values | None = None
+        values: TickValues | None = None
         if graph.suffix == ".rrd":
             from ..logs.replay.opened_run import OpenedRun, TickValues
 
             opened = OpenedRun.of(graph)
-            checked = opened.load(overrides or [])
+            checked = opened.changed(overrides or [])
             values = TickValues(opened.file)
         else:
-            checked = load(graph, overrides or [])
+            checked = checked_file(graph, overrides or [])
         if form.svg or form.png:
             draw_files(checked, closed or (), form.svg, form.png, dark=form.dark)
     if form.as_json:
@@ -120,7 +124,7 @@ def graph(
     elif form.flat:
         typer.echo(checked.text, nl=False)
     elif form.web:
-        serve(checked, values)
+        provided("diagram_page")(checked, values)
     elif form.as_table or not (form.svg or form.png):
         print_table(console(), checked)
 
@@ -131,67 +135,34 @@ def draw_files(
     """Write the block diagram into files.
 
     Raises:
-        AloftError: there is no such sub-graph, or a file cannot be written.
+        AloftError: there is no such sub-graph, a file cannot be written, or the extension ``studio``,
+            which draws, is missing.
     """
-    from ..files.problems import listing
-    from ..runtime.drawing.diagram import diagram, subgraphs
-    from ..runtime.drawing.layout import draw
-    from ..runtime.drawing.render import svg as svg_text
+    from ..runtime.language.extensions import provided
 
-    known = subgraphs(graph)
-    for path in closed:
-        if path not in (*known, "all"):
-            raise AloftError(f"there is no sub-graph {path!r}; there is {listing(known)}")
-    drawing = draw(diagram(graph, known if "all" in closed else closed))
     try:
         if svg is not None:
-            svg.write_text(svg_text(drawing, graph.name), encoding="utf-8")
+            svg.write_text(provided("diagram_svg")(graph, closed), encoding="utf-8")
             typer.echo(f"diagram: {svg}", err=True)
         if png is not None:
-            from ..runtime.drawing.render import save_png
-
-            save_png(drawing, png, dark=dark)
+            provided("diagram_png")(graph, png, closed, dark=dark)
             typer.echo(f"diagram: {png}", err=True)
     except OSError as error:
         raise AloftError(f"cannot write the diagram: {error}") from error
 
 
-def serve(graph: CheckedGraph, values: Values | None = None) -> None:
-    """Show the diagram in a browser until Ctrl-C is pressed."""
-    from ..runtime.drawing.page import ADDRESS, page_server
-    from .shared.viewing import open_page
+def print_shipped(*, as_json: bool) -> None:
+    """Print the shipped graphs by the addresses that every verb takes: aloft run aloft:jump."""
+    from ..runtime.loading.reading.files import shipped_graphs, summary
 
-    server = page_server(graph, values=values)
-    page = f"http://{ADDRESS}:{server.server_address[1]}/"
-    typer.echo(f"{page}\nthe page is there until you press Ctrl-C")
-    open_page(page)
-    try:
-        server.serve_forever()
-    except KeyboardInterrupt:
-        pass
-    finally:
-        server.server_close()
-
-
-def serve_running(
-    graph: Path | None,
-    running: str,
-    overrides: Sequence[str],
-    keys: Path | None,
-    name: str,
-    local: int,
-) -> None:
-    """Show a running graph in a browser until Ctrl-C is pressed; see ``cli.live``.
-
-    Raises:
-        AloftError: it does not run.
-    """
-    from .shared.live import RemoteRunAddress, open_live_run, serve_live
-
-    if graph is not None and graph.suffix not in (".yaml", ".yml"):
-        raise AloftError(f"--live is for a graph that is running; {graph} is none")
-    remote = None if graph is None else RemoteRunAddress(graph, overrides, keys, name, local)
-    serve_live(open_live_run(running, remote))
+    found = [(address, str(path), summary(path)) for address, path in shipped_graphs().items()]
+    if as_json:
+        keys = ("graph", "file", "summary")
+        print_json({"graphs": [dict(zip(keys, row, strict=True)) for row in found]})
+        return
+    out = console()
+    out.print(table("", ("graph", "what it does"), [(row[0], row[2]) for row in found]))
+    say(out, "aloft run aloft:jump runs one; aloft graph aloft:jump --flat prints it whole")
 
 
 def print_table(out: Console, graph: CheckedGraph) -> None:

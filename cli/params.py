@@ -95,10 +95,10 @@ def web(
     ] = None,
 ) -> None:
     """Change them in the browser, with sliders, beside the running graph's diagram."""
-    from .shared.live import open_live_run, serve_live
+    from ..runtime.language.extensions import provided
 
     with errors_reported(False):
-        serve_live(open_live_run(run), save, "parameters")
+        provided("live_page")(None, run, save=save, opened="parameters")
 
 
 def ask_list(run: str) -> tuple[str, list[dict[str, Any]]]:

@@ -52,7 +52,7 @@ def panels_of(run: RecordedRun, name: str, start: float | None, end: float | Non
     Raises:
         AloftError: there is no such signal or element, or nothing was recorded in that time.
     """
-    from ..runtime.loading.reading.selection import Selection, read_selection, select
+    from ..runtime.language.selection import Selection, read_selection, select
 
     known = run.signals()
     source, selection = read_selection(name) or (name, Selection())

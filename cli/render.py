@@ -69,7 +69,7 @@ def render(
     as_json: AsJson = False,
 ) -> None:
     """Draw a recording as a film or a picture: the robot, the forces, the phase."""
-    from ..studies.figures.film import ENDINGS, Camera, Take, instants, pictures, write_film
+    from ..studies.film import ENDINGS, Camera, Take, instants, pictures, write_film
 
     with errors_reported(as_json):
         path = output or Path(f"{recordings[0].stem}.{'gif' if at is None else 'png'}")

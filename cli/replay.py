@@ -134,7 +134,8 @@ def execute(
 ) -> Replayed:
     """Replay, with a progress bar. Raises ``AloftError``."""
     from ..logs.replay.replay import replay as replay_run
-    from .shared.output import TickCounter, progress_bar
+    from .shared.output import progress_bar
+    from .shared.run_graph import TickCounter
 
     if first is not None and until is not None and until <= first:
         raise AloftError(
@@ -142,7 +143,7 @@ def execute(
             f"beginning, e.g. --from {first} --until {first + 100}"
         )
     settings = [text for texts in changed.values() for text in texts]
-    graph = opened.load(settings) if settings else opened.graph
+    graph = opened.changed(settings) if settings else opened.graph
     end = min(until or int(opened.ticks[-1]) + 1, int(opened.ticks[-1]) + 1)
     total = end - max(int(opened.ticks[0]), first or 0)
     with progress_bar(out, f"replaying {graph.name}", total) as (progress, task):

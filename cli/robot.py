@@ -4,27 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.bring_up import bring_up
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_error, print_json, say, table
-from .shared.robot_bench import add_bench_verbs
-from .shared.robot_calibration import calibrate
-from .shared.robot_reach import reach
+from .shared.robot_stand import stand
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..logs.file.reader import RecordedRun
     from ..robots.description import ReadRobot
-    from ..robots.identification import IdentifiedBody, IdentifiedDelay
-    from ..robots.robot_description import RobotDescription
 
 robot = typer.Typer(
     name="robot",
@@ -33,10 +26,7 @@ robot = typer.Typer(
     rich_markup_mode=None,
 )
 
-add_bench_verbs(robot)
-robot.command("calibrate")(calibrate)
-robot.command("bring-up")(bring_up)
-robot.command("reach")(reach)
+robot.command("stand")(stand)
 
 Name = Annotated[str, typer.Argument(help="A shipped robot, or a YAML, URDF or MJCF file.")]
 ModelFile = Annotated[Path, typer.Argument(help="The URDF or MJCF file.")]
@@ -316,178 +306,3 @@ def _link_row(link: dict[str, Any]) -> tuple[str, ...]:
         stands + (" held" if link["held"] else ""),
         str(link["shapes"]),
     )
-
-
-Recording = Annotated[Path, typer.Argument(help="The recording of a run, a file .rrd.")]
-
-
-@robot.command("identify")
-def identify(
-    file: Recording,
-    robot: Annotated[str, typer.Option(help="The path of the robot's block.")] = "robot",
-    base: Annotated[str, typer.Option(help="The port with the estimated base.")] = "estimator.base",
-    command: Annotated[
-        str, typer.Option(help="The port with the robot's commands.")
-    ] = "safety.command",
-    encoder_std: Annotated[
-        float, typer.Option(help="Standard deviation of the encoders' offsets [rad].", min=0.0)
-    ] = 0.003,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Write the values for a graph here.")
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Fit mass, torso's CoM, joint friction and delay to a run, each with its standard deviation."""
-    with errors_reported(as_json):
-        run, description = _recorded(file)
-        body, delay = _identified(run, description, robot, base, command, encoder_std)
-        text = graph_values(run, description, body, delay, file)
-        if out is not None:
-            try:
-                out.write_text(text, encoding="utf-8")
-            except OSError as error:
-                raise AloftError(f"{out} cannot be written: {error.strerror}") from error
-    if as_json:
-        print_json(
-            {
-                "success": True, "recording": str(file), "robot": description.name,
-                "body": asdict(body), "delay": asdict(delay), "graph": text,
-                "written": str(out) if out else None,
-            }
-        )  # fmt: skip
-        return
-    columns = ("value", ">found", ">+-", ">description", "unit")
-    console().print(table(str(file), columns, list(_rows(description, body, delay))))
-    if body.resting:
-        say(console(), f"friction as described, for they hardly turned: {', '.join(body.resting)}")
-    if out is not None:
-        say(console(), f"wrote {out}: include it after the controller and its gains")
-    else:
-        typer.echo(text, nl=False)
-
-
-def _recorded(file: Path) -> tuple[RecordedRun, RobotDescription]:
-    from .shared.viewing import read
-
-    run = read(file)
-    if run.header.robot is None:
-        raise AloftError(f"{file}: the graph {run.header.name} names no robot")
-    return run, run.header.robot
-
-
-def _identified(
-    run: RecordedRun, description: RobotDescription, robot: str, base: str, command: str,
-    encoder_std: float,
-) -> tuple[IdentifiedBody, IdentifiedDelay]:  # fmt: skip
-    import numpy as np
-
-    from ..mathematics.rotations import to_matrix
-    from ..robots.identification import (
-        IdentificationError,
-        MeasuredRun,
-        identify_delay,
-        identify_rigid_body,
-    )
-
-    names = {
-        "position": f"{robot}.joints.position", "velocity": f"{robot}.joints.velocity",
-        "torque": f"{robot}.joints.torque", "rate": f"{robot}.imu.angular_velocity",
-        "force": f"{robot}.imu.specific_force", "closed": f"{robot}.contacts.closed",
-        "turned": f"{base}.orientation", "asked": f"{command}.torque",
-        "stiffness": f"{command}.stiffness", "damping": f"{command}.damping",
-    }  # fmt: skip
-    try:
-        seen = {key: run[name] for key, name in names.items()}
-    except KeyError as error:
-        raise AloftError(
-            f"{run.path}: {error.args[0]}; --robot, --base and --command say which blocks to read"
-        ) from error
-    block = next((each for each in run.header.blocks if each.path == robot), None)
-    if (block is not None and block.period_ticks != 1) or (np.diff(run.ticks) != 1).any():
-        raise AloftError(
-            f"{run.path}: the robot must run, and be recorded, in every tick of the graph"
-        )
-    matrix = np.zeros((3, 3))
-    up = np.zeros((len(seen["turned"]), 3))
-    for k, orientation in enumerate(seen["turned"]):
-        to_matrix(orientation, matrix)
-        up[k] = matrix[2]
-    period = 1.0 / run.header.base_rate
-    motion = MeasuredRun(
-        period, seen["position"], seen["velocity"], seen["torque"], seen["rate"], seen["force"], up,
-        seen["closed"],
-    )  # fmt: skip
-    feedback = (seen["stiffness"] != 0.0).any(axis=1) | (seen["damping"] != 0.0).any(axis=1)
-    try:
-        body = identify_rigid_body(description, motion, encoder_std)
-        return body, identify_delay(period, seen["asked"], seen["torque"], feedback)
-    except IdentificationError as error:
-        raise AloftError(f"{run.path}: {error}") from error
-
-
-def _rows(
-    robot: RobotDescription, body: IdentifiedBody, delay: IdentifiedDelay
-) -> list[tuple[str, str, str, str, str]]:
-    def row(name: str, value: Any, described: float | None, unit: str, factor: float = 1.0) -> Any:
-        shown = "" if described is None else f"{factor * described:.4g}"
-        return (name, f"{factor * value.value:.4g}", f"{factor * value.std:.2g}", shown, unit)
-
-    motors = robot.motors
-    index = {joint.name: k for k, joint in enumerate(robot.joints)}
-    rows = [row("mass", body.mass, robot.total_mass, "kg")]
-    for axis, offset in zip("xyz", body.com_offset, strict=True):
-        rows.append(row(f"torso's CoM, offset {axis}", offset, 0.0, "mm", 1e3))
-    for name, value in body.coulomb.items():
-        k = index[name]
-        unit = robot.joints[k].unit("N m")
-        rows.append(row(f"friction of {name}", value, motors.friction[k], unit))
-    for name, value in body.viscous.items():
-        k = index[name]
-        unit = robot.joints[k].unit("N m s/rad")
-        rows.append(row(f"damping of {name}", value, motors.damping[k], unit))
-    rows.append(row("delay from tick to torque", delay.delay, None, "ms", 1e3))
-    return rows
-
-
-def graph_values(
-    run: RecordedRun,
-    robot: RobotDescription,
-    body: IdentifiedBody,
-    delay: IdentifiedDelay,
-    file: Path,
-) -> str:
-    """Return the values as a graph's ``set``, for the blocks of the recorded graph that take them."""
-
-    def path(kind: str, usual: str) -> str:
-        found = (b.path for b in run.header.blocks if b.type.rpartition(":")[2] == kind)
-        return next(found, usual)
-
-    weight, joint_pd = path("MassEstimator", "weight"), path("JointPD", "joint_pd")
-    waiting = path("DelayEstimator", "delay")
-    usual = run.header.parameters.get(f"{waiting}.usual", 0.001)
-    nominal = max(0.0, delay.delay.value - float(usual))
-    index = {joint.name: k for k, joint in enumerate(robot.joints)}
-    further = {
-        name: max(0.0, value.value - float(robot.motors.friction[index[name]]))
-        for name, value in body.coulomb.items()
-    }
-    offsets = ", ".join(f"{value.value:.4f}" for value in body.com_offset)
-    lines = [
-        f"# {robot.name} as {file.name} shows it, found by `aloft robot identify`. Include this file after the",
-        "# controller and its gains. Standard deviations are in the comments; damping of the joints is not set.",
-        "set:",
-        f"  {weight}.mass: {body.mass.value:.3f} kg  # +- {body.mass.std:.3f} kg",
-        f"  {weight}.mass_spread: {max(1e-4, body.mass.std / body.mass.value):.4f}",
-        f"  {weight}.com_offset: [{offsets}]  # m; +- "
-        + ", ".join(f"{1e3 * value.std:.1f}" for value in body.com_offset)
-        + " mm",
-        f"  {weight}.com_spread: {max(value.std for value in body.com_offset):.4f} m",
-        f"  {waiting}.nominal: {1e3 * nominal:.2f} ms  # +- {1e3 * delay.delay.std:.2f} ms",
-        f"  {joint_pd}.friction:  # beyond the description's [N m]",
-        '    "*": 0',
-        *(
-            f"    {name}: {value:.3f}  # +- {body.coulomb[name].std:.3f}"
-            for name, value in further.items()
-        ),
-    ]
-    return "\n".join(lines) + "\n"

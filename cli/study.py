@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.options import Cluster, JsonBesideTables, Workers, expand_option_groups
+from .shared.options import Cluster, JsonBesideTables, Workers
 from .shared.output import console, errors_reported, print_json, print_warning, say
-from .shared.sensitivity import SensitivityOptions, rank_parameters
 from .shared.studies import (
     check_cells,
     make_all,
@@ -30,7 +29,10 @@ if TYPE_CHECKING:
     from ..studies.study import CellFilter, Study
 
 
-@expand_option_groups
+PAPER = "paper"
+"""The study that draws the figures of the paper; the lab has it."""
+
+
 def study(
     file: Annotated[
         Path, typer.Argument(help="The study file; or 'paper': redraw the paper's figures.")
@@ -72,23 +74,21 @@ def study(
     no_show: Annotated[
         bool, typer.Option("--no-show", help="With --open: only write the recording.")
     ] = False,
-    asked: SensitivityOptions = SensitivityOptions(),  # noqa: B008  # immutable
     as_json: JsonBesideTables = False,
 ) -> None:
     """Run a study: every graph, arm and grid point with every seed, on all cores.
 
     Runs that were made before are not made again, so a study that was stopped or killed goes on
     where it was. Settings are compared over equal seeds. 'aloft tune' searches the parameters of a
-    study's arms, 'aloft falsify' the worst case, and --sensitivity says which parameters matter (extra
-    'analysis'). Exits with 0 when all goals are met, 1 when one is missed, 3 when a run broke.
+    study's arms, 'aloft falsify' the worst case, and 'aloft sensitivity' ranks parameters. Exits with 0 when all goals are met, 1 when one is missed, 3 when a run broke.
 
     'aloft study paper' makes the runs of the paper's figures, draws them into docs (or --out), and
     writes the page about them there.
     """
+    from ..runtime.language.extensions import provided
     from ..studies.batch.seeds import parse_seeds
     from ..studies.comparison import Comparing, compared_axis, read_detect
     from ..studies.reading import read_study, rows_where
-    from .shared.paper import NAME, draw_paper
 
     screen = console(to_stderr=as_json)
     with errors_reported(as_json):
@@ -96,28 +96,17 @@ def study(
             raise AloftError("--open takes --where, --seeds, --out, --no-show and --json")
         if no_show and not number:
             raise AloftError("--no-show would do nothing; add --open N")
-        if file == Path(NAME) and not file.exists():
+        if file == Path(PAPER) and not file.exists():
             if where or dry_run or cluster:
-                raise AloftError(f"'aloft study {NAME}' takes --out, --seeds, --workers and --json")
+                raise AloftError(
+                    f"'aloft study {PAPER}' takes --out, --seeds, --workers and --json"
+                )
+            draw_paper = provided("study_paper")
             raise typer.Exit(draw_paper(out, seeds, workers, screen, as_json))
         found = read_study(file)
         chosen = parse_seeds(seeds) if seeds else list(found.seeds)
         folder = out or Path("results") / found.name
         part = rows_where(found, where or [])
-        if not asked.sensitivity and asked != SensitivityOptions():
-            raise AloftError(
-                "--vary, --spread, --trajectories, --sobol and --samples go with --sensitivity"
-            )
-        if asked.sensitivity:
-            if number or dry_run or compared or detect:
-                raise AloftError(
-                    "--sensitivity takes neither --open nor --dry-run, --compare, --detect"
-                )
-            raise typer.Exit(
-                rank_parameters(
-                    found, part, chosen, folder, workers, cluster, asked, screen, as_json
-                )
-            )
         if number:
             from .shared.studies import open_run
 

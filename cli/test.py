@@ -102,7 +102,7 @@ def sort_targets(targets: list[str]) -> tuple[list[Target], list[str]]:
         AloftError: a target is nothing that can be tested.
     """
     from ..runtime.language.registry import find_block
-    from ..runtime.loading import load
+    from ..runtime.loading import checked_file
     from ..runtime.loading.checking.parameters import plain_parameters
 
     blocks: list[Target] = []
@@ -110,7 +110,7 @@ def sort_targets(targets: list[str]) -> tuple[list[Target], list[str]]:
     for target in targets:
         path = Path(target.partition("::")[0])
         if path.suffix in (".yaml", ".yml"):
-            graph = load(path)
+            graph = checked_file(path)
             blocks += [
                 Target(
                     f"{spec.path} ({spec.block_type.__name__})",

@@ -9,7 +9,7 @@
     position = graph.add("position", "blocks.Integrator", {"u": rate.y})
     graph.wire("error.a", setpoint.y)
     graph.wire("error.b", position.y)
-    result = graph.load().run()
+    result = graph.build().run()
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ class GraphBuilder:
         """Write the graph as a file."""
         Path(path).write_text(self.yaml(), encoding="utf-8")
 
-    def load(self, overrides: Mapping[str, Any] | Sequence[str] = ()) -> Graph:
+    def build(self, overrides: Mapping[str, Any] | Sequence[str] = ()) -> Graph:
         """Return the checked graph.
 
         Raises:

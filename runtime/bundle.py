@@ -3,32 +3,32 @@
 from __future__ import annotations
 
 import ast
-import re
 import shutil
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import yaml
 
-from ..robots.description import ROBOT_FILES
-from .language.stages import CheckedGraph
+from ..files.nodes import ScalarNode, plain
+from ..robots.description import ROBOT_FILES, RobotDescription
+from .language.flat_graph import FlatGraph
 
 _OURS = Path(__file__).parents[1]
-_ROBOT = re.compile(r"^robot: (?P<name>.*)$", re.MULTILINE)
 
 
-def with_robot_beside(graph: CheckedGraph, text: str, folder: Path) -> str:
-    """Return the text of a graph that finds its robot in ``folder``, where the robot is described
-    by a file: its description is written there, as ``robot.yaml``."""
-    found = _ROBOT.search(text)
-    if found is None or graph.robot is None:
-        return text
-    if not str(yaml.safe_load(found["name"])).endswith(ROBOT_FILES):
-        return text
-    data = yaml.safe_dump(graph.robot.content(), sort_keys=False)
+def with_robot_beside(graph: FlatGraph, robot: RobotDescription | None, folder: Path) -> FlatGraph:
+    """Return a graph that finds its robot in ``folder``, where the robot is described by a file: its description is
+    written there, as ``robot.yaml``."""
+    if graph.robot is None or robot is None:
+        return graph
+    if not str(plain(graph.robot.value)).endswith(ROBOT_FILES):
+        return graph
+    data = yaml.safe_dump(robot.content(), sort_keys=False)
     (folder / "robot.yaml").write_text(data, encoding="utf-8")
-    return _ROBOT.sub("robot: robot.yaml", text, count=1)
+    name = replace(graph.robot, value=ScalarNode("robot.yaml", graph.robot.value.where))
+    return replace(graph, robot=name, robot_folder=graph.folder)
 
 
 def is_own_module(imported: str) -> bool:

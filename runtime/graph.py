@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -20,12 +21,11 @@ from .language.errors import AloftError
 from .language.signal_error import FOLDER
 from .language.stages import CheckedGraph, ClockSpec
 from .links.path_ages import path_sinks
-from .loading import load as load_checked
-from .loading import load_text
+from .loading import checked_again, checked_file, checked_text
 from .running.executor import Executor
 from .running.real_time import NO_REAL_TIME, RealTimeOptions
 from .running.run_result import RunResult
-from .running.sinks import Sink
+from .running.sink import Sink
 from .running.stepping import SteppedRun
 
 
@@ -120,20 +120,27 @@ class Graph:
         return self.changed(dict.fromkeys(self.seed_parameters, seed))
 
     def changed(self, overrides: Mapping[str, Any] | Sequence[str]) -> Graph:
-        """Return the same graph with other parameters.
+        """Return the same graph with other parameters; what follows from them is found anew.
 
         Raises:
             LoadError: the changed graph may not run.
+            AloftError: the graph was put together in Python, so there is nothing to check again.
         """
-        return Graph(load_text(self.checked.text, self.checked.file, overrides))
+        if self.checked.flat is None:
+            raise AloftError(
+                f"the graph {self.checked.name!r} cannot be changed: it was put together in Python, "
+                "not loaded; put it together with the other parameters"
+            )
+        return Graph(checked_again(self.checked.flat, overrides))
 
     def _repr_html_(self) -> str:
-        """Draw the block diagram, for notebooks."""
-        from .drawing.diagram import diagram
-        from .drawing.layout import draw
-        from .drawing.render import svg
+        """Draw the block diagram, for notebooks; without the extension ``studio`` return the text
+        of the graph."""
+        from .language.extensions import is_provided, provided
 
-        return svg(draw(diagram(self.checked)), self.checked.name)
+        if is_provided("diagram_svg"):
+            return str(provided("diagram_svg")(self.checked))
+        return f"<pre>{escape(self.checked.text)}</pre>"
 
     def about(self) -> Mapping[str, Any]:
         """Return the additional result fields of a run: none."""
@@ -160,7 +167,7 @@ def load(
     """
     if isinstance(graph, Mapping):
         text = "".join(f"{key}: {text_of(value)}\n" for key, value in graph.items())
-        return Graph(load_text(text, Path(path), overrides))
+        return Graph(checked_text(text, Path(path), overrides))
     if isinstance(graph, str) and "\n" in graph:
-        return Graph(load_text(graph, Path(path), overrides))
-    return Graph(load_checked(Path(graph), overrides))
+        return Graph(checked_text(graph, Path(path), overrides))
+    return Graph(checked_file(Path(graph), overrides))

@@ -19,7 +19,7 @@ from ..files.nodes import Entry, from_plain, plain, text_of
 from ..files.problems import Code, LoadError, Position, Problem, Problems, Report
 from ..runtime.graph import Graph
 from ..runtime.language.stages import CheckedGraph
-from ..runtime.loading import load, load_text
+from ..runtime.loading import checked_file, checked_text
 from .study import Arm, Axis, Coordinate, Study, StudyTask
 
 Tuned = Mapping[str, Mapping[str, Any]]
@@ -152,9 +152,9 @@ def load_cell(
 ) -> Graph:
     """Load the graph between files that it includes, with a cell's overrides. Raises ``LoadError``."""
     if not include and not behind:
-        return Graph(load(graph, overrides))
+        return Graph(checked_file(graph, overrides))
     files = [os.path.relpath(file, origin.parent) for file in (*include, graph, *behind)]
-    return Graph(load_text(f"include: {text_of(files)}\n", origin, overrides))
+    return Graph(checked_text(f"include: {text_of(files)}\n", origin, overrides))
 
 
 def seeded_graph(work: Job) -> Graph:

@@ -25,7 +25,7 @@ from ..planner.library.library import shipped_folder
 from ..planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
 from ..runtime.graph import load
 from ..runtime.language.errors import AloftError
-from ..runtime.loading.flattening.flat import FlatGraph
+from ..runtime.language.flat_graph import FlatGraph
 from ..runtime.loading.reading.files import settings_of
 from ..runtime.running.run_result import RunResult
 from .batch.jobs import job_results
@@ -55,7 +55,7 @@ def trial_settings(trial: str, option: str = "--trial") -> dict[str, Any]:
 
 
 def _default(key: str, defaults: Mapping[str, Any]) -> tuple[str, Any]:
-    """The key of what a trial sets, or of the group around it that is left out by default, and the default."""
+    """Return the key of a trial's setting, or of the group around it that is left out by default, and the default."""
     block, *names = key.split(".")
     value: Any = defaults
     for depth, name in enumerate(names, 1):

@@ -98,10 +98,10 @@ def built(kind: str, source: Path, folder: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def docs_script() -> Callable[[str], ModuleType]:
-    """Imports a script of docs/ by its name; it finds the other scripts beside it."""
+    """Imports a script of lab/pages/ by its name; it finds the other scripts beside it."""
 
     def imported(name: str) -> ModuleType:
-        path = ROOT / "docs" / f"{name}.py"
+        path = ROOT / "lab" / "pages" / f"{name}.py"
         spec = importlib.util.spec_from_file_location(path.stem, path)
         assert spec is not None and spec.loader is not None
         module = importlib.util.module_from_spec(spec)

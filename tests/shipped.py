@@ -6,7 +6,7 @@ from typing import Any
 
 import yaml
 
-from aloft.runtime.loading.reading.files import FOLDER, shipped_graphs
+from aloft.runtime.loading.reading.files import graph_path, shipped_graphs
 
 # Every worker reads all shipped graphs while it collects the tests; PyYAML's own parser takes 5 s for them.
 LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -35,11 +35,6 @@ def contents(path: Path) -> tuple[str, frozenset[str]]:
         if name.endswith(".use"):
             used.add(str(value))
     for name in tree.get("include", ()):
-        file = (
-            FOLDER / name.removeprefix("aloft:")
-            if name.startswith("aloft:")
-            else path.parent / name
-        )
-        theirs, more = contents(file)
+        theirs, more = contents(graph_path(name, path.parent))
         robot, used = robot or theirs, used | more
     return robot, frozenset(used)

@@ -123,7 +123,7 @@ def test_tests_that_pages_cite_are_there() -> None:
         ('"""The order is that of DESIGN.md, section 3."""', ["DESIGN.md"]),
         ("x = 1  # as in runtime/running/chains.py", ["runtime/running/chains.py"]),
         ("# see executors.py", ["executors.py"]),
-        ('"""See tests/graphs/no_such.yaml (wrong) and running/chain.py."""',
+        ('"""See tests/graphs/no_such.yaml (wrong) and running/ticker.py."""',
          ["tests/graphs/no_such.yaml"]),
         ('class A:\n    x = 1\n    """As docs/nowhere.md says."""', ["docs/nowhere.md"]),
         ('"""Writes recordings/jump.rrd, results/a.json, FOLDER/b.yaml and mine.yaml."""', []),

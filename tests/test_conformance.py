@@ -24,22 +24,22 @@ NOT_FOR_BRUCE = {
 NEEDS_DRIVES = {
     "hal.BearRobot": "needs drives on serial ports; hal.TwinRobot is the same driver without them",
 }
-NEEDS_TERMINAL = {"hal.Keyboard": "needs a terminal; checked with one in its own test"}
-NEEDS_LIBRARY = {"blocks.CLibrary": "needs an exported library; checked with some in its own test"}
+NEEDS_TERMINAL = {"hopping.Keyboard": "needs a terminal; checked with one in its own test"}
+NEEDS_LIBRARY = {"export.CLibrary": "needs an exported library; checked with some in its own test"}
 BEYOND = {
-    ("go2", "blocks.SpeedPlan"): "no row of jumps of 0 m can be planned",
+    ("go2", "hopping.SpeedPlan"): "no row of jumps of 0 m can be planned",
     ("bolt", "hal.MujocoRobot"): "its centre of mass is .* outside its contact points",
     ("bolt", "hal.TwinRobot"): "its centre of mass is .* outside its contact points",
     ("simple_humanoid", "hal.MujocoRobot"): "motor WAIST_P has 30 N m and would need",
 }
 """What a robot cannot do although it fits, and how the error says so."""
 ROWS_OF_BRUCE = {
-    "blocks.SpeedPlan": "its example's rows of jumps are BRUCE's; Go2 shows how they are refused"
+    "hopping.SpeedPlan": "its example's rows of jumps are BRUCE's; Go2 shows how they are refused"
 }
 """What takes others a minute of planning, to find that the example is not for them."""
 
 LONG = {
-    "blocks.OnlinePlanner": (
+    "hopping.OnlinePlanner": (
         "outputs written",
         "bounds",
         "inputs kept",

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from aloft import RunResult, load
-from aloft.fmi.exporting.write import export
-from aloft.runtime.loading import load as check
+from aloft.extensions.export.fmi.exporting.write import export
+from aloft.runtime.loading import checked_file
 
 ROOT = Path(__file__).parent.parent
 GALLERY = ROOT / "docs" / "gallery"
@@ -66,8 +66,8 @@ def test_the_ball_is_caught_unless_it_is_seen_badly() -> None:
 
 
 def test_the_mass_is_the_same_on_two_machines() -> None:
-    two = check(GALLERY / "mass_two.yaml")
-    one = {block.path: block for block in check(GALLERY / "mass.yaml").blocks}
+    two = checked_file(GALLERY / "mass_two.yaml")
+    one = {block.path: block for block in checked_file(GALLERY / "mass.yaml").blocks}
     assert {block.path: block.machine for block in two.blocks} == {
         path: "desk" if path in ("setpoint", "pid") else "rail" for path in one
     }

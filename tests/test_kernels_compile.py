@@ -162,9 +162,9 @@ def steer_alone():
     """A jump that is commanded, and its judgement, without a planner."""
     bruce = find_robot("bruce")
     plan = BlockBench(
-        find_block("blocks.SteeredPlan"), {"settle_time": 0.001}, robot=bruce, plain=True
+        find_block("hopping.SteeredPlan"), {"settle_time": 0.001}, robot=bruce, plain=True
     )
-    score = BlockBench(find_block("blocks.CourseScore"), robot=bruce, plain=True)
+    score = BlockBench(find_block("hopping.CourseScore"), robot=bruce, plain=True)
     plan.set("terms", foot_rotation=np.tile(np.eye(3), (2, 1, 1)))
     plan.set("command", number=1, ahead=0.1)
     plan.set(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -205,7 +207,13 @@ class JumpPlan(Block):
                 str(error), fix="robot.ground.scene: flat, or a floor and boxes"
             )
         end, hops = task.places()[-1], task.hops()
-        velocity, momentum = cls._corrections(task, params, context)
+        velocity, momentum = None, None
+        if {"velocity_correction", "momentum_correction"} & context.asked:
+            velocity, momentum = cls._corrections(task, params, context)
+        load = None
+        if "load" in context.asked:
+            library = plan_library(params, context.robot)
+            load = library.load_of(_as_planned(task, params.formulation))
         return {
             "scene": scene,
             "jumps": len(hops),
@@ -216,18 +224,8 @@ class JumpPlan(Block):
             "rise": hops[0].rise if len(hops) == 1 else None,
             "velocity_correction": velocity,
             "momentum_correction": momentum,
-            "load": cls._load(task, params, context),
+            "load": load,
         }
-
-    @classmethod
-    def _load(cls, task: JumpTask, params: Params, context: Context) -> Mapping[str, float] | None:
-        """Return the load of the motors in the kept plan, if a block of the graph wants it."""
-        wanted = {"from": f"{context.path}.load"}
-        given = (block.get("with") or {} for block in context.graph.values())
-        if not any(value == wanted for each in given for value in each.values()):
-            return None
-        assert context.robot is not None
-        return plan_library(params, context.robot).load_of(_as_planned(task, params.formulation))
 
     @classmethod
     def _corrections(cls, task: JumpTask, params: Params, context: Context) -> tuple[Any, Any]:
@@ -448,13 +446,43 @@ def read_or_make_task(wanted: str | Mapping[str, Any], context: Context) -> Jump
         JumpTaskError: it cannot be read as a task.
     """
     from ...planner.library.library import find_task
-    from ...planner.task.read_task import changed_task, read_task, spoken_name
-    from ...planner.task.task import make_task
 
     changes = {} if isinstance(wanted, str) else dict(wanted)
     file = wanted if isinstance(wanted, str) else changes.pop("file", None)
+    robot, told = _SameRobot(context.robot), json.dumps(changes)
     if file is None:
-        robot = {"robot": context.robot.name} if context.robot is not None else {}
-        return spoken_name(make_task({"name": "", **robot, **changes}))
+        return _made_task(told, robot)
     found = find_task(str(file), context.folder, context.graph_folder, Path())
-    return changed_task(found, changes) if changes else read_task(found)
+    return _read_task(found, found.read_bytes(), told, robot)
+
+
+class _SameRobot:
+    """A description as the key of a cache: equal to itself alone."""
+
+    def __init__(self, robot: RobotDescription | None) -> None:
+        self.robot = robot
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _SameRobot) and other.robot is self.robot
+
+    def __hash__(self) -> int:
+        return id(self.robot)
+
+
+@lru_cache(maxsize=32)
+def _made_task(told: str, robot: _SameRobot) -> JumpTask:
+    """Return the task that a graph itself gives."""
+    from ...planner.task.read_task import spoken_name
+    from ...planner.task.task import make_task
+
+    own = {"robot": robot.robot.name} if robot.robot is not None else {}
+    return spoken_name(make_task({"name": "", **own, **json.loads(told)}))
+
+
+@lru_cache(maxsize=32)
+def _read_task(file: Path, content: bytes, told: str, robot: _SameRobot) -> JumpTask:
+    """Return the task in a file of that content, with changes; a graph that is loaded and run reads it once."""
+    from ...planner.task.read_task import changed_task, read_task
+
+    changes = json.loads(told)
+    return changed_task(file, changes) if changes else read_task(file)

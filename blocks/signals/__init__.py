@@ -14,6 +14,7 @@ Conventions, the same everywhere:
 
 from __future__ import annotations
 
+from ...planner.task.phase import Phase
 from .control import (
     BaseState,
     ContactState,
@@ -33,7 +34,7 @@ from .control import (
     WholeBodyCommand,
     WholeBodyTarget,
 )
-from .jumping import JumpReference, Phase, PhaseState
+from .jumping import JumpReference, PhaseState
 from .robot import (
     CommandMode,
     ContactSwitches,
@@ -47,25 +48,12 @@ from .robot import (
     ThrustCommand,
     ThrusterState,
 )
-from .steering import (
-    BodyTwist,
-    CourseGoal,
-    FootholdPose,
-    JumpCommand,
-    JumpFrame,
-    PlanOutcome,
-    PlanRequest,
-    PlanSegment,
-    SeenStones,
-)
 
 __all__ = [
     "BaseState",
-    "BodyTwist",
     "CommandMode",
     "ContactState",
     "ContactSwitches",
-    "CourseGoal",
     "DelayEstimate",
     "DrivePhase",
     "DynamicsTerms",
@@ -73,27 +61,20 @@ __all__ = [
     "ExternalForce",
     "FootLoad",
     "FootTarget",
-    "FootholdPose",
     "ImuReading",
     "JointCommand",
     "JointState",
     "JointTarget",
     "JointTorque",
-    "JumpCommand",
-    "JumpFrame",
     "JumpReference",
     "MassEstimate",
     "MotorCondition",
     "Phase",
     "PhaseState",
-    "PlanOutcome",
-    "PlanRequest",
-    "PlanSegment",
     "PointTarget",
     "PoseMeasurement",
     "RobotHealth",
     "RobotTruth",
-    "SeenStones",
     "SwitchFault",
     "SwitchHealth",
     "ThrustCommand",

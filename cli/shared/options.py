@@ -50,12 +50,12 @@ def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
     """List the parameters, as ``block.parameter=``, of the graph on the command line that begin
     with a text."""
     from ...runtime.language.parameters import declared_fields
-    from ...runtime.loading import LoadError, load
+    from ...runtime.loading import LoadError, checked_file
 
     # Arguments in front of an option that still waits for its value are not parsed yet.
     given = context.params.get("graph") or next(iter(context.args), "")
     try:
-        graph = load(str(given))
+        graph = checked_file(str(given))
     except LoadError:
         return []  # no graph yet, or one that may not run: nothing to offer
     names = [

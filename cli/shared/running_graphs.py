@@ -200,8 +200,8 @@ def observer_of(
             clear which run is meant.
     """
     from ...runtime.links.observer import Observer
-    from ...runtime.loading import load
+    from ...runtime.loading import checked_file
     from ...runtime.placement.placed import split_over_machines
 
-    placed = split_over_machines(load(graph, [*settings_of(graph, process), *overrides]))
+    placed = split_over_machines(checked_file(graph, [*settings_of(graph, process), *overrides]))
     return Observer(placed, keys, name)

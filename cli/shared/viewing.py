@@ -53,18 +53,19 @@ def draw(recording: Path, layout: Path | None, path: Path) -> Path:
 
 
 def diagram_of(run: RecordedRun) -> bytes:
-    """Draw the block diagram of the graph that ran, as PNG; nothing where its code has gone since."""
+    """Return the block diagram of the graph that ran, as PNG; empty where its code has gone since, or
+    where the extension that draws is missing."""
     from ...logs.replay.opened_run import OpenedRun
-    from ...runtime.drawing.diagram import diagram
-    from ...runtime.drawing.layout import draw as drawn
-    from ...runtime.drawing.render import save_png
+    from ...runtime.language.extensions import is_provided, provided
 
+    if not is_provided("diagram_png"):
+        return b""
     try:
         graph = OpenedRun(run, Path(run.header.source).parent).graph
     except (AloftError, OSError):
         return b""
     picture = io.BytesIO()
-    save_png(drawn(diagram(graph)), picture)
+    provided("diagram_png")(graph, picture)
     return picture.getvalue()
 
 

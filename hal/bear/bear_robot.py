@@ -47,7 +47,7 @@ class BearParameters(DriveParameters):
 
 
 class BearRobot(DrivenRobot):
-    """The robot of the graph on BEAR drives and BRUCE's sensor board (``docs/bring_up.md``).
+    """The robot of the graph on BEAR drives and BRUCE's sensor board (``extensions/commissioning/bring_up.md``).
 
     **Nothing moves unless** ``armed`` is true. Without it the drives are watched, and never written
     to. With it ``open`` finds every drive, refuses if somebody else sends on the bus, waits for the

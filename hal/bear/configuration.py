@@ -1,7 +1,7 @@
 """The hardware's file: the connections of a robot's drives and sensor board, and their limits.
 
 It belongs to one robot on one bench: its ports, addresses, directions and offsets. See
-``docs/bring_up.md`` for how its values are found, and ``graphs/hardware/bruce.yaml`` for one.
+``extensions/commissioning/bring_up.md`` for how its values are found, and ``graphs/hardware/bruce.yaml`` for one.
 """
 
 from __future__ import annotations
@@ -361,7 +361,7 @@ class Hardware(Parameters):
         )
         return [
             f"{'no motor has' if len(names) == len(motors) else f'{listing(names)}: not calibrated,'} "
-            f"{what}: do {step} of docs/bring_up.md"
+            f"{what}: do {step} of extensions/commissioning/bring_up.md"
             for what, step, names in parts
             if names
         ]

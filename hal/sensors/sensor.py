@@ -109,7 +109,7 @@ class Sensor(ABC):
             field: prod(each.resolve(dimensions or {}))
             for field, each in self.signal.fields.items()
         }
-        """How many numbers each field has."""
+        """Number of elements of each field."""
 
     def reading(
         self, true: Mapping[str, Array], errors: Mapping[str, FieldErrors], out: Signal

@@ -56,7 +56,7 @@ CONTACT_TIME_CONSTANT = 0.004
 LEAST_RISE = 1e-4
 """A level height field is stored as one of so many metres."""
 FIELD_THICKNESS = 0.1
-"""How far a height field reaches below its lowest corner [m]."""
+"""Depth of a height field below its lowest corner [m]."""
 CONTACT_IMPEDANCE = (0.95, 0.99, 0.001, 0.5, 2.0)
 
 
@@ -67,7 +67,7 @@ def build_mujoco_model(
     timestep: float = 0.0005,
     variation: Variation | None = None,
 ) -> MjModel:
-    """The compiled model of the robot, with the actuator profile in use, in that scene.
+    """Return the compiled model of the robot, with the actuator profile in use, in that scene.
 
     Raises:
         ValueError: the description's joints are not in depth-first order, or its transmission
@@ -92,7 +92,7 @@ def mujoco_spec(
     timestep: float = 0.0005,
     variation: Variation | None = None,
 ) -> MjSpec:
-    """The model before it is compiled, so that callers can add to it, such as colours.
+    """Return the model before it is compiled, so that callers can add to it, such as colours.
 
     In this model limbs that overlap in the standing pose do collide.
 
@@ -118,12 +118,12 @@ def mujoco_spec(
 
 
 def body_name(link: str) -> str:
-    """The name of a link's body in the model; the name ``world`` is reserved by MuJoCo."""
+    """Return the name of a link's body in the model; the name ``world`` is reserved by MuJoCo."""
     return "link/world" if link == "world" else link
 
 
 def _overlaps(model: MjModel, robot: RobotDescription) -> list[tuple[str, str]]:
-    """The pairs of bodies whose shapes overlap in the standing pose.
+    """Return the pairs of bodies whose shapes overlap in the standing pose.
 
     For a robot on a fixed base they include pairs with the world, on which it is mounted.
     """
@@ -144,7 +144,7 @@ def _overlaps(model: MjModel, robot: RobotDescription) -> list[tuple[str, str]]:
 
 
 def _surface(variation: Variation) -> dict[str, Any]:
-    """The contact parameters of every geom; stiffness varies as 1 / (time constant)^2."""
+    """Return the contact parameters of every geom; stiffness varies as 1 (time constant)^2."""
     time_constant = CONTACT_TIME_CONSTANT / float(np.sqrt(variation.contact_stiffness))
     return {
         "condim": 3,
@@ -155,7 +155,7 @@ def _surface(variation: Variation) -> dict[str, Any]:
 
 
 def _sole(variation: Variation) -> dict[str, Any]:
-    """Those of a contact point: rubber decides alone how soft its contacts are."""
+    """Return the settings of a contact point: rubber decides alone how soft its contacts are."""
     surface = _surface(variation)
     if variation.sole is not None:
         surface |= {"solref": list(variation.sole), "priority": 1}
@@ -196,7 +196,7 @@ def _add_ground(spec: MjSpec, scene: Terrain, variation: Variation) -> None:
 
 
 def _piece(piece: Ground | HeightField, variation: Variation) -> dict[str, Any]:
-    """The contact parameters of a piece of ground; what has its own decides alone."""
+    """Return the contact parameters of a piece of ground; what has its own decides alone."""
     surface = _surface(variation)
     if piece.friction is None and piece.stiffness == 1.0:
         return surface
@@ -208,7 +208,7 @@ def _piece(piece: Ground | HeightField, variation: Variation) -> dict[str, Any]:
 
 
 def _limb_of_link(robot: RobotDescription) -> dict[str, int]:
-    """The number of every link's limb, 0 for the base; one joint of the base carries a limb."""
+    """Return the number of every link's limb, 0 for the base; one joint of the base carries a limb."""
     limb = {robot.base: 0}
     for joint in robot.joints:
         on_base = joint.parent == robot.base
@@ -307,7 +307,7 @@ def _add_robot(spec: MjSpec, robot: RobotDescription, variation: Variation) -> N
 
 
 def _add_mounted_sensors(spec: MjSpec, robot: RobotDescription, variation: Variation) -> None:
-    """A site for every sensor that the description mounts on a link, and what gives its true values."""
+    """Add a site for every sensor that the description mounts on a link, and what gives its true values."""
     names = [link.name for link in robot.links]
     for sensor in mounted_sensors(robot):
         body = body_name(sensor.link)
@@ -356,20 +356,20 @@ def _add_sensors(spec: MjSpec, robot: RobotDescription, *, uneven: bool) -> None
 
 
 def _soles(robot: RobotDescription) -> list[str]:
-    """The links of feet with several contact points, between which they may touch uneven ground."""
+    """Return the links of feet with several contact points, between which they may touch uneven ground."""
     owners = [contact.foot for contact in robot.contacts]
     return [foot.link for foot in robot.feet if owners.count(foot.name) > 1]
 
 
 def number_of_soles(model: MjModel) -> int:
-    """How many soles may touch the ground between their contact points."""
+    """Return the number of soles that may touch the ground between their contact points."""
     return sum(model.sensor(k).name.startswith("sole/") for k in range(model.nsensor))
 
 
 def build_world(
     params: SimulatorParameters, robot: RobotDescription, variation: Variation
 ) -> MjModel:
-    """The simulator's model of the robot in the scene these parameters describe.
+    """Return the simulator's model of the robot in the scene these parameters describe.
 
     Raises:
         ValueError: the simulator cannot express the robot; see ``build_mujoco_model``.
@@ -403,7 +403,7 @@ it takes longer than anything else before a run. Callers get copies."""
 
 
 def joint_armature(robot: RobotDescription, variation: Variation | None = None) -> Array:
-    """The armature [kg m^2] (n_joints,) of the joints, from all motors without a tendon."""
+    """Return the armature [kg m^2] (n_joints,) of the joints, from all motors without a tendon."""
     armature, shared = np.zeros(len(robot.joints)), shared_motors(robot)
     for motor, inertia in enumerate(_carried(robot, variation)):
         if motor not in shared:
@@ -440,7 +440,7 @@ def add_rotors(spec: MjSpec, robot: RobotDescription, variation: Variation | Non
 
 
 def _carried(robot: RobotDescription, variation: Variation | None) -> list[float]:
-    """The rotor inertia of every motor that the bodies carry [kg m^2]."""
+    """Return the rotor inertia of every motor that the bodies carry [kg m^2]."""
     variation = variation or Variation()
     found: list[float] = (variation.rotor_share * variation.rotors(robot)).tolist()
     return found

@@ -45,8 +45,8 @@ class MujocoRobot(SimulatedRobot):
     the damping ``drive_damping`` on every joint, whatever the command's gains are.
 
     Thrusters of the description get an input ``thrust``, which arrives with the joint command of its tick, and
-    the output ``thrusters``. Thrust is limited to what the description says and follows with its lag; in all modes but
-    ``ACTIVE`` nothing is asked of them, so a robot in flight falls when a run ends.
+    the output ``thrusters``. Thrust is limited to that of the description and follows with its lag; in all modes but
+    ``ACTIVE`` none is commanded, so a robot in flight falls when a run ends.
 
     Start: the robot stands in its description's pose (torso turned by a drawn
     ``initial_attitude_error``, soles flat), held by its drives around the static torques with gains
@@ -78,7 +78,7 @@ class MujocoRobot(SimulatedRobot):
 
     drives = State(DriveState, text="commands in the drives and on their way")
     feedback = State(FeedbackState, text="the goals of the drives' own loops")
-    record = State(TickRecord, text="what happened in the physics steps of the last tick")
+    record = State(TickRecord, text="sums over the physics steps of the last tick")
     thrust: ThrustCommand
     thrusters: ThrusterState
     thrust_queue: ThrustQueue
@@ -171,14 +171,14 @@ class MujocoRobot(SimulatedRobot):
 
     @classmethod
     def ports_of_thrusters(cls, robot: RobotDescription) -> dict[str, Port[Any]]:
-        """The ports of thrusters, and what is on its way to them."""
+        """Return the ports of thrusters, and what is on its way to them."""
         ports = cls.thrust_ports(robot)
         queue = State(ThrustQueue, text="thrust that goes with the commands in the drives")
         return {**ports, "thrust_queue": queue} if ports else {}
 
     @classmethod
     def nominal_delay(cls, params: Parameters) -> float:
-        """The latency that is simulated."""
+        """Return the latency that is simulated."""
         assert isinstance(params, SimulatorParameters)
         return params.latency
 
@@ -186,7 +186,7 @@ class MujocoRobot(SimulatedRobot):
     def example_inputs(
         cls, rng: np.random.Generator, dimensions: Mapping[str, int]
     ) -> Mapping[str, Mapping[str, Any]]:
-        """A push at a point that the robot has, and none where it has no points."""
+        """Return a push at a point that the robot has, and none where it has no points."""
         count = dimensions["n_points"]
         force = rng.uniform(-1.0, 1.0, 3) if count else np.zeros(3)
         return {"push": {"force": force, "point": rng.integers(max(1, count))}}
@@ -256,8 +256,8 @@ class MujocoRobot(SimulatedRobot):
 
     @property
     def calls(self) -> Mapping[str, Sequence[Call]]:
-        """What a tick calls: ``read`` the sensors, ``send`` the command, ``clear`` the record, and
-        ``advance`` to the next tick."""
+        """The calls of a tick: ``read`` the sensors, ``send`` the command, ``clear`` the record, and ``advance`` to the
+        next tick."""
         return {
             "read": self._reading.calls, "send": self._sending.calls,
             "clear": (self.plant.clearing,), "advance": self._ticking.calls,
@@ -306,7 +306,7 @@ class MujocoRobot(SimulatedRobot):
         self.plant.load()
 
     def state_elements(self) -> Mapping[str, Sequence[StateElements]]:
-        """The parts of the simulator's state: positions and velocities by joint, and the rest."""
+        """Export the parts of the simulator's state: positions and velocities by joint, and the rest."""
         return {"physics.integration": integration_elements(self.plant.model)}
 
     def metrics(self) -> Mapping[str, Metric]:
@@ -322,8 +322,8 @@ def _is_whole(ratio: float) -> bool:
 
 
 def _nearest_step(period: float, timestep: float) -> float:
-    """The largest step [s] up to ``timestep`` that divides the period; one of few digits if such a
-    step is near."""
+    """Return the largest step [s] up to ``timestep`` that divides the period; one of few digits if such a step is
+    near."""
     count = max(1, math.ceil(period / timestep))
     steps = [period / k for k in range(count, 2 * count + 1)]
     return next((step for step in steps if abs(step * 1e5 - round(step * 1e5)) < 1e-9), steps[0])

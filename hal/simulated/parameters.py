@@ -13,7 +13,7 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from ...robots.description import RobotDescription
-from ...robots.terrain import Terrain
+from ...robots.terrain import Terrain, WorldParameters
 from ...runtime.language.parameters import Parameters, parameter
 from ..drive_control import DriveGains
 from . import scenes
@@ -222,7 +222,7 @@ class ActuatorParameters(Parameters):
     )
 
 
-class SimulatorParameters(DriveGains):
+class SimulatorParameters(DriveGains, WorldParameters):
     """The parameters of ``MujocoRobot``; by default there are no disturbances."""
 
     seed: int = parameter(0, ge=0, text="the seed of all random numbers")

@@ -1,7 +1,7 @@
 """The simulated robot without its ports: rigid bodies, contact, sensors, and a standing start.
 
-``MujocoRobot`` puts a graph's ports around it, and the twin the buses of the real robot. Whoever
-owns a plant says which torques its drives give, and lets it simulate so many physics steps.
+``MujocoRobot`` puts a graph's ports around it, and the twin the buses of the real robot. The
+owner of a plant gives the torques of its drives, and lets it simulate so many physics steps.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from .stance import (
     holding_gains,
     holding_torque,
     passive_joints,
-    place_standing,
+    set_standing_pose,
 )
 from .state import (
     PhysicsState,
@@ -70,21 +70,22 @@ if TYPE_CHECKING:
 Kind = TypeVar("Kind", bound=Effect)
 
 SETTLING_TIME, OBSERVED_TIME = 0.3, 0.02
-"""How long a robot settles before it is checked whether it stands, and the last part of it, in which the load is averaged [s]."""
+"""Time for which a robot settles before the check that it stands, and the last part of it, in which the load is
+averaged [s]."""
 
 
 class JointTorques(Protocol):
     """The drives of a plant, as its physics sees them."""
 
     limits: MotorLimits
-    """What the motors can do, and what is asked of them within that."""
+    """Limits of the motors, and their commanded torques within them."""
 
     def torque_call(
         self, step: Indices, position: Array, velocity: Array, speed: Array, out: Array
     ) -> Call:
-        """The call that writes the joint torques [N m] during the physics step ``step``, a count
-        without a dimension, to ``out``, from the reading of the drives' encoders [rad, rad/s] and the true
-        joint velocities ``speed`` [rad/s]. All arrays keep their place in memory."""
+        """Return the call that writes the joint torques [N m] during the physics step ``step``, a count without a
+        dimension, to ``out``, from the reading of the drives' encoders [rad, rad/s] and the true joint velocities
+        ``speed`` [rad/s]. All arrays keep their place in memory."""
 
 
 class Plant:
@@ -113,7 +114,7 @@ class Plant:
         clearing: begins a new record, except for the memory of the switches.
         forces: what acts on the robot from outside.
         step1, step2: the two parts of a physics step, see ``step_calls``.
-        late: by how much [s] the physics steps begin after the control clock's ticks.
+        late: delay [s] of the physics steps after the control clock's ticks.
     """
 
     def __init__(
@@ -149,7 +150,7 @@ class Plant:
 
     @staticmethod
     def state_dimensions(params: SimulatorParameters, robot: RobotDescription) -> Mapping[str, int]:
-        """The sizes of the simulator's state and of the random streams'."""
+        """Return the sizes of the simulator's state and of the random streams'."""
         import mujoco
 
         model = build_world(params, robot, Variation())
@@ -241,7 +242,7 @@ class Plant:
             bool(self.variation.link_length),
         )
         normal = self._params.build_scene(robot).normal(0.0, 0.0)
-        place_standing(model, data, base, robot, tilt, level, normal)
+        set_standing_pose(model, data, base, robot, tilt, level, normal)
         if self.gantry is not None and params.start.gantry is not None:
             base.shift(np.array([0.0, 0.0, params.start.gantry.height]))
             mujoco.mj_kinematics(model, data)
@@ -300,7 +301,7 @@ class Plant:
         self, drives: JointTorques, steps: int, push: ExternalForce | None = None,
         thrusters: Sequence[Call] = (),
     ) -> CallSequence:  # fmt: skip
-        """Calls that simulate physics steps; afterwards all derived quantities are up to date.
+        """Return the calls that simulate physics steps; afterwards all derived quantities are up to date.
 
         ``push`` is a force from outside, held for all these steps; see ``forces.check``. With it the cable
         pulls, too: it is put on when the robot stands. ``thrusters`` are what those do in every step.
@@ -378,17 +379,17 @@ class Plant:
         return [call for effect in self.effects for call in effect.health_calls(health)]
 
     def voltage(self, supply: float) -> float:
-        """The voltage of the pack [V], or of the ``supply`` where none is simulated."""
+        """Return the voltage of the pack [V], or of the ``supply`` where none is simulated."""
         return supply if self.battery is None else float(self.battery.voltage[0])
 
     def temperature(self, motor: int) -> float:
-        """The temperature of a motor's winding [deg C]; the nominal one where none is simulated."""
+        """Return the temperature of a motor's winding [deg C]; the nominal one where none is simulated."""
         if self.windings is None:
             return NOMINAL
         return float(self.physics.winding_temperature[motor])
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The values that were drawn from the seed."""
+        """Return the values that were drawn from the seed."""
         x, y, z = (1e3 * float(value) for value in self.variation.base_com_offset)
         return {
             "robot_base_com_x_mm": x,
@@ -408,5 +409,5 @@ class Plant:
 
 
 def _noisy_fields(robot: RobotDescription) -> dict[str, int]:
-    """How many fields with noise every mounted sensor has."""
+    """Return the number of fields with noise of every mounted sensor."""
     return {sensor.name: len(sensor.signal.fields) for sensor in mounted_sensors(robot)}

@@ -111,7 +111,7 @@ class SimulatedSensor:
         """The calls after every physics step."""
 
     def bias(self, field: str) -> Array:
-        """The bias of a field that was drawn from the seed."""
+        """Return the bias of a field that was drawn from the seed."""
         return self._errors[list(self.sensor.signal.fields).index(field)][1].bias
 
     def reset(self) -> None:
@@ -202,7 +202,7 @@ class SimulatedSensors:
     def dimensions(
         params: SimulatorParameters, sensors: Sequence[MountedSensor]
     ) -> Mapping[str, int]:
-        """The sizes of ``SensorMemory``."""
+        """Return the sizes of ``SensorMemory``."""
         numbers = [sum(sensor.sizes.values()) for sensor in sensors]
         samples = [n * _slots(s, params) for n, s in zip(numbers, sensors, strict=True)]
         return {
@@ -257,11 +257,11 @@ class SimulatedSensors:
         return [call for each in self.mounted for call in each.reading(outputs[each.sensor.name])]
 
     def after_step(self) -> list[Call]:
-        """What the mounted sensors do after every physics step."""
+        """Return the calls of the mounted sensors after every physics step."""
         return [call for each in self.mounted for call in each.after_step]
 
 
 def _slots(sensor: MountedSensor, params: SimulatorParameters) -> int:
-    """How many samples a sensor keeps; a sample is at least a physics step."""
+    """Return the number of samples a sensor keeps; a sample is at least a physics step."""
     late = max(sensor.noise(name).delay for name in sensor.signal.fields)
     return math.ceil(late / params.timestep - 1e-9) + 1

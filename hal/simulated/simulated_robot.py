@@ -56,7 +56,7 @@ def impossible_effects(
 def _unknown_windings(
     windings: WindingParameters, robot: RobotDescription
 ) -> Iterator[UnmetRequirement]:
-    """Report what neither the parameters nor the description say of windings that warm."""
+    """Report values of windings that warm which neither the parameters nor the description give."""
     supply = None if robot.supply is None else windings.of(robot)
     for name, unit in (("heat_capacity", "J/K"), ("thermal_resistance", "K/W")):
         if supply is None or getattr(supply, f"winding_{name}") is None:
@@ -96,23 +96,23 @@ class SimulatedRobot(Robot, ABC):
     outside = "simulated"
 
     push = Input(ExternalForce, default={}, text="a force from outside, held for the tick")
-    truth = Output(RobotTruth, truth=True, text="what only a simulator knows")
+    truth = Output(RobotTruth, truth=True, text="true state of the robot")
     physics = State(PhysicsState, text="the simulator's state, written for a snapshot")
 
     @classmethod
     def ports_of(cls, sensors: tuple[MountedSensor, ...]) -> dict[str, Port[Any]]:
-        """The outputs of mounted sensors, and the memory that their simulation needs."""
-        memory = State(SensorMemory, text="what the simulation of mounted sensors keeps")
+        """Return the outputs of mounted sensors, and the memory that their simulation needs."""
+        memory = State(SensorMemory, text="memory of the simulation of mounted sensors")
         return {**super().ports_of(sensors), "sensor_memory": memory}
 
     @classmethod
     def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
-        """``ground_tolerance``: how far the ground may be from what a task says [m], for scores."""
+        """Export ``ground_tolerance``: the largest distance of the ground from that of a task [m], for scores."""
         assert isinstance(params, SimulatorParameters)
         scene = params.build_scene(context.robot)
         return {**super().exported_values(params, context), "ground_tolerance": scene.uneven}
 
     @classmethod
     def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
-        """The number of named points that a force may act at; the seed is not a dimension."""
+        """Return the number of named points that a force may act at; the seed is not a dimension."""
         return {"n_points": len(robot.points) if robot is not None else 0}

@@ -1,4 +1,4 @@
-"""How the bodies of a simulated robot and its ground differ from their descriptions, drawn by the seed."""
+"""Differences of the bodies of a simulated robot and its ground from their descriptions, drawn by the seed."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ class Variation:
     thrust: tuple[float, ...] = ()
 
     def factor(self, of: tuple[float, ...], k: int) -> float:
-        """The factor of a link, joint, motor or thruster."""
+        """Return the factor of a link, joint, motor or thruster."""
         return of[k] if of else 1.0
 
     def metrics(self) -> dict[str, float]:
-        """The extremes of what differs from link to link and from joint to joint, where it does."""
+        """Return the extremes of the factors that vary from link to link and from joint to joint, if any."""
         found: dict[str, float] = {}
         for name, values in (
             ("link_length", self.link_length), ("static_friction", self.static_friction),
@@ -65,7 +65,7 @@ class Variation:
         return found
 
     def rotors(self, robot: RobotDescription) -> Array:
-        """The inertias of all rotors at their outputs [kg m^2], (n_motors,)."""
+        """Return the inertias of all rotors at their outputs [kg m^2], (n_motors,)."""
         nominal = np.asarray(robot.motors.rotor_inertia)
         return nominal * np.array(self.rotor_inertia) if self.rotor_inertia else nominal
 
@@ -81,7 +81,7 @@ def _gravity(params: SimulatorParameters) -> tuple[float, float, float]:
 
 
 def _static_friction(joints: JointEffects, seed: int, n: int) -> tuple[float, ...]:
-    """Static friction of each of ``n`` joints as a multiple of Coulomb friction; empty: no difference."""
+    """Return the static friction of each of ``n`` joints as a multiple of Coulomb friction; empty: no difference."""
     if joints.static_friction == 1.0:
         return ()
     draws = stream(seed, Purpose.STATIC_FRICTION).uniform(-1.0, 1.0, n)
@@ -92,7 +92,7 @@ def _static_friction(joints: JointEffects, seed: int, n: int) -> tuple[float, ..
 def draw_pull(
     cable: CableParameters, seed: int, robot: RobotDescription
 ) -> tuple[float, float, float]:
-    """The force of a cable [N, world]."""
+    """Return the force of a cable [N, world]."""
     pull, hanging = cable.pull * robot.weight, cable.weight * robot.weight
     heading = 2.0 * math.pi * float(stream(seed, Purpose.CABLE).random())
     return pull * cos(heading), pull * sin(heading), -hanging

@@ -25,7 +25,7 @@ from .injected_faults import ANSWERS, InjectedFault, InjectedFaults, apply_fault
 from .snapshot import Attributes
 
 BRAKING = 0.5
-"""Of an actuator with shorted windings [N m s/rad]: an estimate."""
+"""Braking of an actuator with shorted windings [N m s/rad]: an estimate."""
 SUPPLY = 14.8
 """The battery's voltage [V]."""
 
@@ -80,7 +80,7 @@ class Twin:
         self.limits = self.drives.limits
         self.faults = InjectedFaults(faults, params.seed)
         self.lockstep = True
-        """Whether time goes on with the exchanges; else only by ``advance``."""
+        """True if time goes on with the exchanges; else it does only by ``advance``."""
         self.released = False
         self.exchanges = 0
         self.zero = 0

@@ -9,7 +9,7 @@ from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from ...robots.terrain import SupportsScene, Terrain
+from ...robots.terrain import Terrain, WorldParameters
 from ...runtime.language.layout import Layout
 from ...runtime.language.quantities import Quantity
 from ...runtime.language.signals import Field, Signal
@@ -86,7 +86,7 @@ def make_header(
 
 def terrain_of(graph: CheckedGraph) -> Terrain | None:
     """Return the ground of the first block that has a world."""
-    scenes = (spec.params for spec in graph.blocks if isinstance(spec.params, SupportsScene))
+    scenes = (spec.params for spec in graph.blocks if isinstance(spec.params, WorldParameters))
     return next((params.build_scene(graph.robot) for params in scenes), None)
 
 

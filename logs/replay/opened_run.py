@@ -21,22 +21,23 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from ...files.nodes import plain
 from ...robots.description import RobotDescription, RobotError, find_robot
-from ...runtime.drawing.page import shown
 from ...runtime.language.errors import AloftError, ExitCode
+from ...runtime.language.flat_graph import FlatGraph
 from ...runtime.language.layout import Layout
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.stages import CheckedGraph
-from ...runtime.loading import load_text
+from ...runtime.loading import checked_again, flattened_text
 from ...runtime.running.memory import BoundGraph, Snapshot
 from ..file.dependencies import digests, files_read, named_file, other_files, unpacked
 from ..file.format import Header
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read
+from ..viewing.signal_names import value_text
 from .replay import late_blocks
 
 _ENTRY = re.compile(r"(?P<block>[^:/]+)\.(?P<parameter>\w+)(?P<kind>: |/)(?P<name>.*)", re.DOTALL)
-_ROBOT = re.compile(r"^robot: .*$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -44,25 +45,22 @@ class Restored:
     """The restored files of a recording.
 
     Attributes:
-        text: the graph's text, which names the restored description of the robot.
-        overrides: by ``block.parameter``, the restored file or folder.
+        overrides: by ``block.parameter`` the restored file or folder, and by ``robot`` the description.
         said: what was restored and why, each in one sentence.
         entries: the entries of the restored files in ``Header.files``.
     """
 
-    text: str
     overrides: Mapping[str, str]
     said: tuple[str, ...]
     entries: frozenset[str]
 
 
-def restored(header: Header, text: str, graph_folder: Path, folder: Path) -> Restored:
+def restored(header: Header, graph: FlatGraph, folder: Path) -> Restored:
     """Write the files that are other than they were, or are not there any more, to ``folder``.
 
     Args:
         header: the recording's header.
-        text: the graph's text.
-        graph_folder: the folder of the graph file, to which names are relative.
+        graph: the recorded graph; the names of files are relative to its folder.
         folder: an empty folder.
     """
     overrides: dict[str, str] = {}
@@ -70,7 +68,7 @@ def restored(header: Header, text: str, graph_folder: Path, folder: Path) -> Res
     for entry, block, parameter, kind, name in _entries(header):
         content = unpacked(header.contents[header.files[entry]])
         found_in_folder = kind == "/"
-        now = named_file(name, graph_folder)
+        now = named_file(name, graph.folder)
         if now is not None and sha256(now.read_bytes()).hexdigest() == header.files[entry]:
             continue
         place = folder / f"{block}.{parameter}"
@@ -85,15 +83,15 @@ def restored(header: Header, text: str, graph_folder: Path, folder: Path) -> Res
         why = "is not there any more" if now is None else "has other content now"
         said.append(f"the file of {entry} {why}; the recorded one is used")
     robot = header.robot
-    if robot is not None and _ROBOT.search(text) and not _is_present(robot, text, graph_folder):
+    if robot is not None and graph.robot is not None and not _is_present(robot, graph):
         place = folder / f"{robot.name}.yaml"
         _write(place, yaml.safe_dump(robot.content(), sort_keys=False).encode())
-        text = _ROBOT.sub(lambda _: f"robot: {place}", text, count=1)
+        overrides["robot"] = str(place)
         said.append(
             f"the description of the robot {robot.name} is not the recorded one any more, or is "
             "not there; the recorded one is used"
         )
-    return Restored(text, overrides, tuple(said), frozenset(entries))
+    return Restored(overrides, tuple(said), frozenset(entries))
 
 
 def _entries(header: Header) -> Iterator[tuple[str, str, str, str, str]]:
@@ -109,13 +107,12 @@ def _write(path: Path, content: bytes) -> None:
     path.write_bytes(content)
 
 
-def _is_present(robot: RobotDescription, text: str, folder: Path) -> bool:
-    """Tell whether the robot that the graph's text names is, in every value, the recorded one."""
-    found = _ROBOT.search(text)
-    assert found is not None
-    name = str(yaml.safe_load(found[0])["robot"])
+def _is_present(robot: RobotDescription, graph: FlatGraph) -> bool:
+    """Check whether the robot that the graph names is, in every value, the recorded one."""
+    assert graph.robot is not None
+    name = str(plain(graph.robot.value))
     try:
-        now = find_robot(name, folder)
+        now = find_robot(name, graph.robot_folder)
     except (LookupError, RobotError, OSError):
         return False
     if robot.profile in now.profiles:
@@ -158,29 +155,33 @@ class OpenedRun:
         return cls(file, folder or _folder(Path(path), Path(file.header.source)), restore)
 
     @cached_property
-    def restored(self) -> Restored:
-        """The graph's text, and the files that were taken from the recording."""
+    def flat(self) -> FlatGraph:
+        """The recorded graph as it was written, not checked. Raises ``LoadError``."""
         header = self.file.header
-        if not self.restore:
-            return Restored(header.graph, {}, (), frozenset())
-        return restored(header, header.graph, self.folder, Path(self._place.name))
-
-    def load(self, overrides: Sequence[str] = ()) -> CheckedGraph:
-        """Load the recorded graph with further overrides. Raises ``LoadError``."""
-        header, kept = self.file.header, self.restored
         name = Path(header.source).name or f"{header.name}.yaml"
+        return flattened_text(header.graph, self.folder / name)
+
+    @cached_property
+    def restored(self) -> Restored:
+        """The files that were taken from the recording."""
+        if not self.restore:
+            return Restored({}, (), frozenset())
+        return restored(self.file.header, self.flat, Path(self._place.name))
+
+    def changed(self, overrides: Sequence[str] = ()) -> CheckedGraph:
+        """Return the recorded graph with further overrides. Raises ``LoadError``."""
         changed = [text.partition("=")[0] for text in overrides]
         files = [
-            f"{parameter}={json.dumps(file)}"
-            for parameter, file in kept.overrides.items()
-            if parameter not in changed and f"{parameter.rpartition('.')[0]}.use" not in changed
+            f"{key}={json.dumps(file)}"
+            for key, file in self.restored.overrides.items()
+            if key not in changed and f"{key.rpartition('.')[0]}.use" not in changed
         ]
-        return load_text(kept.text, self.folder / name, [*files, *overrides])
+        return checked_again(self.flat, [*files, *overrides])
 
     @cached_property
     def graph(self) -> CheckedGraph:
         """The recorded graph. Raises ``LoadError`` where code or files have gone since."""
-        return self.load()
+        return self.changed()
 
     @property
     def bus(self) -> Layout:
@@ -281,6 +282,6 @@ class TickValues:
         row = int(known.searchsorted(tick, side="right")) - 1
         _, rows = self._run.window(int(known[row]), int(known[row]) + 1)
         return {
-            name: shown(self._layout.view(rows, name)[0], signal.unit or "")
+            name: value_text(self._layout.view(rows, name)[0], signal.unit or "")
             for name, signal in self._signals.items()
         }

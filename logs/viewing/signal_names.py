@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from ..file.format import RecordedField
 
 MOST_NAMES = 48
 """Largest number of elements of a matrix that has names, and so a plot: more are unreadable."""
+
+MOST_NUMBERS = 16
+"""Numbers of one field in a text; of a longer one the first, and the count."""
 
 BASE_NAMES = {
     "floating": ("base x", "base y", "base z", "base roll", "base pitch", "base yaw"),
@@ -112,3 +116,15 @@ AXES = np.array([0xEF5350FF, 0x66BB6AFF, 0x42A5F5FF], np.uint32)
 def axis_colors(field: RecordedField) -> NDArray[np.uint32] | None:
     """Return the colours of a vector's three lines; ``None`` where the viewer may choose."""
     return AXES if field.shape == (3,) else None
+
+
+def value_text(value: NDArray[Any], unit: str = "") -> str:
+    """Return the numbers of a field as a short text."""
+    flat = np.ravel(value)
+    texts = [f"{x:.6g}" if flat.dtype.kind == "f" else str(x) for x in flat[:MOST_NUMBERS].tolist()]
+    text = ", ".join(texts) if flat.size != 1 else texts[0]
+    if flat.size > MOST_NUMBERS:
+        text += f", ... ({flat.size} in all)"
+    if flat.size != 1:
+        text = f"[{text}]"
+    return f"{text} {unit}".rstrip()

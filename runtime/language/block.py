@@ -284,7 +284,8 @@ class Block:
         twice; ``name`` may also be a parameter of the block. Loading puts the value in its place.
         An ``UnmetRequirement`` in place of a value is the reason why there is none, reported where
         a graph uses it. ``context`` is as for ``requires``, but has no dimensions and no wired
-        inputs. What this raises should be an unmet requirement of ``requires`` as well.
+        inputs; its ``asked`` names the values that are used: one that is costly and not among them may be
+        ``None``. What this raises should be an unmet requirement of ``requires`` as well.
         """
         return {}
 

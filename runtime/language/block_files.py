@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -41,8 +41,8 @@ def classes_in(path: Path) -> tuple[WrittenClass, ...]:
     return tuple(_written(node) for node in tree.body if isinstance(node, ast.ClassDef))
 
 
-def blocks_in_packages(root: Path, packages: Iterable[str]) -> Mapping[str, Path]:
-    """Return the blocks that graphs can use as ``package.Class``, with their files, sorted by name.
+def blocks_in_packages(packages: Mapping[str, Path]) -> Mapping[str, Path]:
+    """Find the blocks that graphs can use as ``package.Class``, with their files, sorted by name.
 
     A class is a block if it derives from ``Block`` or ``KernelBlock``, also through other classes.
     It can be used if it has or inherits a port and one of the methods ``step`` and ``emit``, it is
@@ -50,8 +50,8 @@ def blocks_in_packages(root: Path, packages: Iterable[str]) -> Mapping[str, Path
     """
     classes = [
         (package, path, written)
-        for package in packages
-        for path in files_of(root / package)
+        for package, folder in packages.items()
+        for path in files_of(folder)
         for written in classes_in(path)
     ]
     found: dict[str, Path] = {}
@@ -90,8 +90,9 @@ def blocks_in_folder(folder: Path) -> Iterator[str]:
 
 @lru_cache(maxsize=16)
 def files_of(folder: Path) -> tuple[Path, ...]:
-    """All Python files below a folder, sorted; it must not change while the program runs."""
-    return tuple(sorted(folder.rglob("*.py")))
+    """All Python files below a folder but those of its tests, sorted; it must not change while the program runs."""
+    tests = folder / "tests"
+    return tuple(sorted(path for path in folder.rglob("*.py") if tests not in path.parents))
 
 
 def _some_files(folder: Path) -> Iterator[Path]:

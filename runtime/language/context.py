@@ -57,8 +57,9 @@ class Context:
     names are relative to it. ``graph_folder`` is the folder of the graph that was loaded, beside
     which users keep their modules.
 
-    During ``exported_values``, and only then, ``graph`` has the entry of every block
-    in the flattened graph, by its path: ``use``, ``with``, ``in`` and what else it has.
+    During ``exported_values``, and only then, ``asked`` names the values that other blocks ask for, and
+    ``graph`` has the entry of every block in the flattened graph, by its path: ``use``, ``with``,
+    ``in`` and what else it has.
     """
 
     path: str
@@ -70,6 +71,7 @@ class Context:
     wired: tuple[str, ...] = ()
     folder: Path = Path()
     graph_folder: Path = Path()
+    asked: frozenset[str] = frozenset()
     graph: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @property

@@ -63,7 +63,7 @@ def is_live(info: FieldInfo) -> bool:
 
 
 def group_of(info: FieldInfo) -> type[Parameters] | None:
-    """The model of a parameter that is a group of parameters, or may be left out as one."""
+    """Return the model of a parameter that is a group of parameters, or may be left out as one."""
     kinds = [
         kind for kind in get_args(info.annotation) or (info.annotation,) if kind is not type(None)
     ]
@@ -72,7 +72,7 @@ def group_of(info: FieldInfo) -> type[Parameters] | None:
 
 
 def declared_fields(model: type[Parameters], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
-    """The parameters of a model and of its groups, by path: ``sensors.imu.bandwidth``.
+    """Yield the parameters of a model and of its groups, by path: ``sensors.imu.bandwidth``.
 
     A group that may be left out stands before what is in it.
     """
@@ -85,7 +85,7 @@ def declared_fields(model: type[Parameters], prefix: str = "") -> Iterator[tuple
 
 
 def given_values(params: Parameters, prefix: str = "") -> Iterator[tuple[str, Any, FieldInfo]]:
-    """The values of parameters and of the groups in them, by path, each with its declaration."""
+    """Yield the values of parameters and of the groups in them, by path, each with its declaration."""
     for name, info in type(params).model_fields.items():
         value = getattr(params, name)
         if isinstance(value, Parameters):

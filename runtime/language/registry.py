@@ -1,9 +1,10 @@
 """Finds blocks by the name a graph file uses, and imports only those that are used.
 
-There are three kinds of names:
+There are four kinds of names:
 
 * ``blocks.LandingHeuristic``, ``hal.MujocoRobot``: a package of aloft and a class in it. By
   convention its file is ``landing_heuristic.py``; otherwise all files are parsed to find it.
+* ``hopping.SteeredPlan``: an extension, of aloft or of another installed package, and a class in it.
 * ``package.module:Class``: a class of a module beside the graph, in the current folder, or
   wherever Python finds it.
 * The name of an entry point of the group ``aloft.blocks`` of an installed package.
@@ -24,10 +25,11 @@ from types import ModuleType
 from .block import Block
 from .block_files import blocks_in_folder, blocks_in_packages, files_of
 from .errors import DeclarationError, UnknownBlockError
+from .extensions import SHIPPED, extension, extensions, missing_extension, own_extensions
 from .importing import BlockImportError, import_module, user_module
 
-PACKAGES = ("blocks", "hal", "ros2", "fmi")
-"""The packages of aloft that hold blocks."""
+PACKAGES = ("blocks", "hal")
+"""The packages of the core that hold blocks."""
 ENTRY_POINTS = "aloft.blocks"
 """The group in which other packages announce blocks."""
 
@@ -43,9 +45,11 @@ def snake_case(name: str) -> str:
 
 @lru_cache(maxsize=1)
 def _own_blocks() -> Mapping[str, Path]:
-    """Return the blocks of aloft and their files, found by parsing the files without importing
-    them."""
-    return blocks_in_packages(_ROOT, PACKAGES)
+    """Find the blocks of aloft and their files, by parsing the files without importing them."""
+    return blocks_in_packages(
+        {name: _ROOT / name for name in PACKAGES}
+        | {each.name: each.folder for each in extensions() if each.name != "lab"}
+    )
 
 
 @lru_cache(maxsize=1)
@@ -74,6 +78,9 @@ def block_name(block_type: type[Block]) -> str:
     package = module.removeprefix(f"{_OURS}.").partition(".")[0]
     if module.startswith(f"{_OURS}.") and package in PACKAGES:
         return f"{package}.{block_type.__name__}"
+    for each in extensions():
+        if module.startswith(f"{each.package}."):
+            return f"{each.name}.{block_type.__name__}"
     return f"{module.partition('@')[0]}:{block_type.__name__}"
 
 
@@ -91,7 +98,7 @@ def find_block(name: str, folder: Path | None = None) -> type[Block]:
             raise UnknownBlockError(f"{name!r} is not of the form package.module:Class")
         return _class_of(user_module(module_name, _places(folder)), class_name, name)
     package, _, class_name = name.partition(".")
-    if package in PACKAGES and class_name:
+    if class_name:
         module = _own_module(package, class_name)
         if module is not None:
             return _class_of(module, class_name, name)
@@ -99,6 +106,8 @@ def find_block(name: str, folder: Path | None = None) -> type[Block]:
     if point is not None:
         module_name, _, class_name = point.partition(":")
         return _class_of(import_module(module_name), class_name, name)
+    if class_name and package in SHIPPED and package not in own_extensions():
+        raise UnknownBlockError(missing_extension(package, f"the block {name!r}"))
     raise UnknownBlockError(f"there is no block called {name!r}")
 
 
@@ -125,21 +134,27 @@ def _places(folder: Path | None) -> tuple[Path, ...]:
 
 @cache
 def _own_module(package: str, class_name: str) -> ModuleType | None:
-    """Return the module of aloft that has the class: first the one that convention gives, then
-    any."""
+    """Import the module of a package of the core, or of an extension, that has the class: first the
+    one that convention gives, then any."""
+    if package in PACKAGES:
+        folder, imported = _ROOT / package, f"{_OURS}.{package}"
+    elif (found := extension(package)) is not None:
+        folder, imported = found.folder, found.package
+    else:
+        return None
     stem = snake_case(class_name)
-    for path in files_of(_ROOT / package):
+    for path in files_of(folder):
         if path.stem == stem:
-            module = _import_own(path)
+            module = _import_file(path, folder, imported)
             if hasattr(module, class_name):
                 return module
     written = _own_blocks().get(f"{package}.{class_name}")
-    return _import_own(written) if written is not None else None
+    return _import_file(written, folder, imported) if written is not None else None
 
 
-def _import_own(path: Path) -> ModuleType:
-    parts = path.relative_to(_ROOT).with_suffix("").parts
-    return import_module(".".join((_OURS, *parts)).removesuffix(".__init__"))
+def _import_file(path: Path, folder: Path, package: str) -> ModuleType:
+    parts = path.relative_to(folder).with_suffix("").parts
+    return import_module(".".join((package, *parts)).removesuffix(".__init__"))
 
 
 def _class_of(module: ModuleType, class_name: str, name: str) -> type[Block]:

@@ -11,30 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
 from ...files.problems import Position
 from ...robots.description import RobotDescription
 from .block import Block
+from .flat_graph import FlatGraph, HasSource
 from .parameters import Parameters
 from .quantities import Quantity
-
-
-class HasSource:
-    """The base of every stage's wire, which has a ``source``: an output ``block.port``."""
-
-    source: str
-
-    @property
-    def source_block(self) -> str:
-        """The path of the block that writes."""
-        return self.source.rpartition(".")[0]
-
-    @property
-    def source_port(self) -> str:
-        """The name of the output."""
-        return self.source.rpartition(".")[2]
 
 
 @dataclass(frozen=True)
@@ -157,14 +143,22 @@ class CheckedGraph:
     clock: ClockSpec = ClockSpec()
     file: str = ""
     """The graph file, as it was given; files that the graph names are relative to its folder."""
-    text: str = ""
-    """The flattened graph as YAML, with includes expanded and overrides applied."""
     overrides: Mapping[str, Any] = field(default_factory=dict)
+    flat: FlatGraph | None = None
+    """The stage before, from which the graph is checked again with other parameters; ``None`` where the graph
+    was put together in Python."""
+    resolved: FlatGraph | None = None
+    """The same with the values in place of references to what other blocks tell."""
     unchecked: tuple[str, ...] = ()
     """Wires on which the reader has a unit and the source does not say its own, one text each."""
     machines: tuple[MachineSpec, ...] = ()
     """The machines that the graph may be spread over; the first runs what is placed nowhere."""
     links: LinkSettings = LinkSettings()
+
+    @cached_property
+    def text(self) -> str:
+        """The resolved graph as YAML, for recordings; empty where it was put together in Python."""
+        return "" if self.resolved is None else self.resolved.text
 
     @property
     def base_period(self) -> float:

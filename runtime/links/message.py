@@ -54,7 +54,7 @@ def schema_of(link: MachineLink) -> bytes:
 
 
 @dataclass(frozen=True)
-class Span:
+class FieldSpan:
     """A stretch of bytes that lies without a gap in the bus and in the payload."""
 
     bus: int
@@ -62,21 +62,21 @@ class Span:
     size: int
 
 
-def spans_of(link: MachineLink, layout: Layout) -> tuple[Span, ...]:
+def spans_of(link: MachineLink, layout: Layout) -> tuple[FieldSpan, ...]:
     """Return the stretches of a link's fields in the bus; neighbouring fields are one stretch.
 
     The fields of a port that have one type are neighbours, so a port with fields of one type that
     are all read is one copy.
     """
     places = sorted(layout.byte_range(field.name) for field in link.fields)
-    spans: list[Span] = []
+    spans: list[FieldSpan] = []
     used = 0
     for first, last in places:
         if spans and spans[-1].bus + spans[-1].size == first:
             before = spans.pop()
-            spans.append(Span(before.bus, before.payload, before.size + last - first))
+            spans.append(FieldSpan(before.bus, before.payload, before.size + last - first))
         else:
-            spans.append(Span(first, used, last - first))
+            spans.append(FieldSpan(first, used, last - first))
         used += last - first
     return tuple(spans)
 

@@ -14,7 +14,7 @@ from ...files.nodes import MapNode, text_of
 from ...files.validation import unit_of
 from ..language.errors import AloftError
 from ..language.stages import CheckedGraph
-from ..loading import LoadError, flatten, load_text
+from ..loading import LoadError, checked_text, flatten
 
 LONGEST_LIST = 12
 """Numbers of a list that have a slider each; a longer one is changed as a text."""
@@ -226,7 +226,7 @@ def write_overlay(path: Path, graph: CheckedGraph, rows: Sequence[Mapping[str, A
     try:
         included = os.path.relpath(source.resolve(), path.resolve().parent)
         text = _text(included, found)
-        load_text(text, path)
+        checked_text(text, path)
         if path.exists() and not path.read_text(encoding="utf-8").startswith(FIRST_LINE):
             raise AloftError(f"{path} is there already; give another name with --save FILE")
         path.write_text(text, encoding="utf-8")

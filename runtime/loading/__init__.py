@@ -6,7 +6,7 @@ Its stages have a folder each: ``reading`` (one file as it is written, with the 
 """
 
 from ...files.problems import Code, LoadError, Problem, Report
-from .load import check, flatten, load, load_text
+from .checked import check, checked_again, checked_file, checked_text, flatten, flattened_text
 
 __all__ = [
     "Code",
@@ -14,7 +14,9 @@ __all__ = [
     "Problem",
     "Report",
     "check",
+    "checked_again",
+    "checked_file",
+    "checked_text",
     "flatten",
-    "load",
-    "load_text",
+    "flattened_text",
 ]

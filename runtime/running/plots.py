@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...plotting import Curve, Panel, panels_svg, save_panels
+from ..language.selection import Selection, read_selection, select
 from ..language.signals import Field
 from ..language.stages import BlockSpec, CheckedGraph
-from ..loading.reading.selection import Selection, read_selection, select
 
 
 class Logged(Protocol):

@@ -16,7 +16,7 @@ from typing import Any, Self
 from ..language.errors import AloftError
 from ..language.stages import MachineSpec
 from ..placement.placed import PlacedGraph
-from .keys import check_endpoints, secured
+from .tls import check_endpoints, secured
 from .transport import MessageCallback, NetworkTransport, free_ports
 from .zenoh_session import as_chunk, prefix_of, session_config
 
@@ -29,7 +29,7 @@ class ZenohTransport(NetworkTransport):
         machines: all machines of the graph, in its order.
         wait: whether sending waits where the queue is full. Lockstep waits, since nothing may be
             lost; a free-running part drops, since nothing may wait.
-        security: TLS and access control, as ``keys.secured`` gives them; none: neither.
+        security: TLS and access control, as ``tls.secured`` gives them; none: neither.
     """
 
     def __init__(

@@ -238,7 +238,7 @@ def long_legged(tick: int) -> Inputs:
 
 SCENES: Mapping[str, list[Scene]] = {
     "blocks.CircleTarget": [Scene({"start": 0.0})],
-    "blocks.Pad": [Scene({"beat": 1, "ahead": 0.1, "aside": 0.1, "turn": 0.1, "hold_time": 0.2})],
+    "hopping.Pad": [Scene({"beat": 1, "ahead": 0.1, "aside": 0.1, "turn": 0.1, "hold_time": 0.2})],
     "blocks.Step": [Scene({"at": 0.1})],
     "blocks.Timer": [Scene({"duration": 0.1}, lambda tick: {"u": {"value": True}})],
     "blocks.PID": [

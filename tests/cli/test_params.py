@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from aloft.runtime.live.live_run import LiveRun
+from aloft.extensions.studio.live.live_run import LiveRun
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]

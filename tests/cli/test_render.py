@@ -12,8 +12,8 @@ from aloft.logs.recording.recorder import Recorder
 from aloft.logs.viewing.contacts import force_scale
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import AloftError
-from aloft.studies.figures.film import Camera, Take, instants
-from aloft.studies.figures.offscreen import NoRendererError, Offscreen
+from aloft.studies.film import Camera, Take, instants
+from aloft.studies.offscreen import NoRendererError, Offscreen
 
 from .conftest import run_for_json, run_here
 

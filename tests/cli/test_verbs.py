@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import aloft
-import aloft.benchmarks.catalogue
+import aloft.lab.benchmarks.catalogue
 import aloft.runtime.loading
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
@@ -156,7 +156,9 @@ def test_bench_prints_rows_and_exits_by_the_goals(
     for met, code in ((True, 0), (None, 0), (False, 1)):
         rows = [{**row, "goal": 1.1, "met": met, "note": ""}]
         monkeypatch.setattr(
-            aloft.benchmarks.catalogue, "run_benchmarks", lambda *_, r=rows: {**results, "rows": r}
+            aloft.lab.benchmarks.catalogue,
+            "run_benchmarks",
+            lambda *_, r=rows: {**results, "rows": r},
         )
         assert call_json("bench", "scheduler", code=code)["rows"] == rows
         text = call("bench", code=code).stdout

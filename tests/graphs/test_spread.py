@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.placement.placed import spread
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_spread
@@ -20,7 +20,7 @@ GRAPHS = kinds()
 @pytest.mark.long
 @pytest.mark.parametrize("address", GRAPHS)
 def test_bytes_do_not_depend_on_the_split(address: str) -> None:
-    graph = load(GRAPHS[address])
+    graph = checked_file(GRAPHS[address])
     rng = np.random.default_rng(len(address))
     places = {spec.path: str(rng.choice(list(MACHINES))) for spec in graph.blocks}
     alone = run(graph, TICKS)
@@ -32,5 +32,5 @@ def test_bytes_do_not_depend_on_the_split(address: str) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("path", sorted((Path(__file__).parents[2] / "graphs/machines").glob("*")))
 def test_shipped_placements(path: Path) -> None:
-    graph = load(path)
+    graph = checked_file(path)
     assert run_spread(graph, TICKS, timeout=60.0).run_hash == run(graph, TICKS).run_hash

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 import aloft
+from aloft.extensions.analysis.studies.falsification import end_cells, searched_cells
 from aloft.studies.expansion import Cell, cells, checked_cells
-from aloft.studies.falsification import end_cells, searched_cells
 from aloft.studies.reading import read_study
 from aloft.studies.tuning import extreme_cells, tuning_cells
 

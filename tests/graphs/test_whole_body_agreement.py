@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import aloft
-from aloft.benchmarks.full_program import FullProgram
 from aloft.blocks.control.whole_body_controller import WholeBodyController
+from aloft.lab.benchmarks.full_program import FullProgram
 from aloft.mathematics.whole_body_qp import SOLVED
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph

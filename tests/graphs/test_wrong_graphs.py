@@ -13,7 +13,7 @@ from aloft.files.problems import listing
 from aloft.robots.description import robot_names
 from aloft.runtime.language.errors import ExitCode
 from aloft.runtime.language.requirements import fix_without_robot
-from aloft.runtime.loading import Code, LoadError, Report, check, load
+from aloft.runtime.loading import Code, LoadError, Report, check, checked_file
 
 FOLDER = Path(__file__).parent / "wrong"
 GRAPHS = sorted(path.stem for path in FOLDER.glob("*.yaml"))
@@ -65,7 +65,7 @@ def test_ten_mistakes_in_one_pass(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_load_raises_the_report(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(FOLDER)
     with pytest.raises(LoadError) as caught:
-        load("shape.yaml")
+        checked_file("shape.yaml")
     assert caught.value.report == check("shape.yaml")
     assert str(caught.value) == caught.value.report.text()
     assert caught.value.exit_code == ExitCode.BAD_INPUT

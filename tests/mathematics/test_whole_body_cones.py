@@ -14,10 +14,10 @@ from aloft.mathematics.whole_body_cones import (
     PLANES,
     add_bending,
     add_curvature,
+    add_violated_planes,
     cone_memory,
-    cut,
     multiplier_curvature,
-    touch,
+    refresh_support_planes,
     turned,
     write_planes,
 )
@@ -49,13 +49,13 @@ def project(forces, friction):
         program.matrix[6 * point + 5, 3 * point + 2] = -1.0
     rows = write_planes(count, n, first, friction, cones, program)
     assert solve_program(n, rows, program, memory, x) >= 0
-    cut(count, first, friction, 1e-2, cones, program, memory, x)
+    add_violated_planes(count, first, friction, 1e-2, cones, program, memory, x)
     for step in range(12):
         held = int(memory.is_active[:rows].sum())
         gradient = x - forces.ravel()
         recompute_multipliers(n, held, gradient, memory)
         multiplier_curvature(count, held, first, cones, memory, x)
-        touch(count, friction, 1e-12, cones, x)
+        refresh_support_planes(count, friction, 1e-12, cones, x)
         write_planes(count, n, first, friction, cones, program)
         program.hessian[:] = np.eye(n)
         add_curvature(count, cones, program.hessian)
@@ -82,12 +82,12 @@ def test_no_more_planes_than_there_is_room_for():
     cones = cone_memory(1)
     for angle in np.linspace(0.0, 6.0, 40):
         cones.curvature[0] = 1.0
-        touch(1, 0.5, 1e-12, cones, np.array([np.cos(angle), np.sin(angle), 1.0]))
+        refresh_support_planes(1, 0.5, 1e-12, cones, np.array([np.cos(angle), np.sin(angle), 1.0]))
         assert cones.used[0] <= PLANES
     newest = np.array([np.cos(6.0), np.sin(6.0)])
     along = cones.planes[0, : cones.used[0]] @ newest
     assert along.max() == pytest.approx(1.0)
-    touch(1, 0.5, 1e-12, cones, np.array([np.cos(6.001), np.sin(6.001), 1.0]))
+    refresh_support_planes(1, 0.5, 1e-12, cones, np.array([np.cos(6.001), np.sin(6.001), 1.0]))
     assert (np.abs(cones.planes[0] @ newest - 1.0) < 1e-9).sum() == 0  # one plane, not two near it
 
 
@@ -95,5 +95,7 @@ def test_a_force_at_the_apex_has_no_direction():
     cones = cone_memory(1)
     program = QuadraticProgram(np.eye(3), np.zeros(3), np.zeros((14, 3)), np.zeros(14))
     nothing = np.array([1e-9, 0.0, -1e-15])
-    assert cut(1, 6, 0.5, 1e-2, cones, program, active_set_memory(3, 14), nothing) == 0
+    assert (
+        add_violated_planes(1, 6, 0.5, 1e-2, cones, program, active_set_memory(3, 14), nothing) == 0
+    )
     assert turned(1, 0.5, cones, nothing) == 0.0

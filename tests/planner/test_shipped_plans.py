@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from tests.robots.example_robots import INSTALLED
 
-from aloft.blocks.jumping.speed_plan import row_lengths, row_task
+from aloft.extensions.hopping.blocks.speed_plan import row_lengths, row_task
 from aloft.planner.checking.validity import check_plan
 from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.task.plan import read_plan

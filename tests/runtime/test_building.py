@@ -37,7 +37,7 @@ def loop() -> GraphBuilder:
 def test_what_is_built_runs_and_is_the_same_graph_as_its_file(tmp_path: Path) -> None:
     graph = loop()
     assert repr(graph) == "<GraphBuilder 'loop': 4 blocks>"
-    result = graph.load().run(log=True)
+    result = graph.build().run(log=True)
     # x' = 4 (1 - x) by Euler's method
     expected = 1.0 - (1.0 - 4.0 * 0.01) ** np.arange(50)
     np.testing.assert_allclose(result.signal("position.y.value")[:, 0], expected, atol=1e-12)
@@ -52,7 +52,7 @@ def test_a_block_may_be_added_in_the_background() -> None:
     wave = graph.add("wave", "blocks.SineWave")
     graph.add("slow", Gain, {"u": wave.y}, background={"latency": "30 ms", "late": "hold"})
     assert "background: {latency: 30 ms, late: hold}" in graph.yaml()
-    assert graph.load().checked.block("slow").block_type.delay_runs == 3
+    assert graph.build().checked.block("slow").block_type.delay_runs == 3
 
 
 def test_rates_offsets_and_delays_are_written_where_they_are_given() -> None:

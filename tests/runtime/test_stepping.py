@@ -189,7 +189,7 @@ def test_a_graph_is_built_in_python_and_is_the_one_of_its_yaml() -> None:
     text = builder.yaml()
     assert 'in: {u: "rate.y.value[0]"}' in text
     assert "b: {from: position.y, delay: 2, initial: {value: [0.5]}}" in text
-    assert builder.load().run().run_hash == load(text).run().run_hash
+    assert builder.build().run().run_hash == load(text).run().run_hash
     assert repr(builder) == "<GraphBuilder 'graph': 4 blocks>"
 
 
@@ -206,7 +206,7 @@ def test_mistakes_of_a_builder() -> None:
     with pytest.raises(
         LoadError, match=r"graph.yaml:\d+:\d+: unknown-source: one .* has no output 'z'"
     ):
-        builder.load()
+        builder.build()
 
 
 def test_many_runs_leave_nothing_behind(graph: Graph) -> None:

@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 import aloft
+from aloft.extensions.analysis.studies.falsification import searched_cells
 from aloft.runtime.running.run_result import RunResult
 from aloft.studies import shared_start
 from aloft.studies.execution import outcome_of, run_job
 from aloft.studies.expansion import Job, job, seeded_graph
-from aloft.studies.falsification import searched_cells
 from aloft.studies.reading import read_study
 from aloft.studies.shared_start import SharedStart, shared_result
 from aloft.studies.study import Study

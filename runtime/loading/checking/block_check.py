@@ -13,12 +13,12 @@ from ....files.nodes import ListNode, MapNode, Node
 from ....files.problems import Code, Position, Problems, listing, nearest
 from ...language.block import Block, Clock, Context, Input, Output, Port, UnmetRequirement
 from ...language.feedthrough import inputs_read_by_emit
+from ...language.flat_graph import FlatBlock, FlatGraph
 from ...language.layout import LARGEST
 from ...language.parameters import Parameters
 from ...language.quantities import UNCHECKED, Quantity, quantity_of
 from ...language.requirements import unmet_needs, unmet_requirements
 from ...language.signals import DTYPES, Field, Signal
-from ..flattening.flat import FlatBlock, FlatGraph
 from .settings import Settings
 
 

@@ -11,13 +11,13 @@ from ....files.problems import Code, Position, Problems, nearest
 from ....robots.description import find_robot, robot_names
 from ...language.block import Block
 from ...language.errors import BlockError, UnknownBlockError
+from ...language.flat_graph import FlatBlock, FlatGraph
 from ...language.importing import BlockImportError, UnknownModuleError
 from ...language.registry import find_block, nearest_names
 from ...language.requirements import fix_without_robot
 from ...language.schedule import ScheduleBlock, find_loops, order_blocks
 from ...language.signals import Signal
 from ...language.stages import BlockSpec, CheckedGraph, Wire
-from ..flattening.flat import FlatBlock, FlatGraph
 from ..flattening.machines import on_machines, read_machines
 from ..flattening.rates import check_hyperperiod, read_offset, read_period
 from .background import move_to_background
@@ -38,7 +38,7 @@ LONGEST_RING = 8
 
 def check_graph(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     """Check the whole graph. Returns ``None`` if there is any problem, also one noted before."""
-    settings = read_settings(graph, problems)
+    settings, flat = read_settings(graph, problems), graph
     graph = resolve_references(graph, settings, problems)
     if graph.empty:
         where = Position(graph.file, 1, 1)
@@ -66,7 +66,7 @@ def check_graph(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     if len(problems) or settings.base_rate is None:
         return None
     checked = _assemble(graph, settings, settings.base_rate, drafts, values)
-    checked = replace(on_machines(checked, graph, machines), links=links)
+    checked = replace(on_machines(checked, graph, machines), links=links, flat=flat, resolved=graph)
     check_paths(checked, graph, problems)
     check_watchdog(checked, graph, problems)
     return None if len(problems) else checked
@@ -351,7 +351,6 @@ def _assemble(
         robot=settings.robot,
         clock=settings.clock,
         file=graph.file,
-        text=graph.text,
         overrides=graph.overrides,
         unchecked=tuple(unchecked_wires(drafts)),
     )

@@ -16,10 +16,7 @@ from numpy.typing import NDArray
 from ....files.nodes import Entry, MapNode, text_of
 from ....files.problems import Code, Problems, listing, nearest
 from ....robots.description import RobotDescription
-from ...language.parameters import Parameters
-from ...language.quantities import quantity_of
-from ...language.signals import Field, Signal
-from ..flattening.flat import (
+from ...language.flat_graph import (
     FlatBlock,
     FlatGraph,
     FlatWire,
@@ -27,7 +24,10 @@ from ..flattening.flat import (
     WireSlice,
     plain_slice,
 )
-from ..reading.selection import Selection, runs, select
+from ...language.parameters import Parameters
+from ...language.quantities import quantity_of
+from ...language.selection import Selection, runs, select
+from ...language.signals import Field, Signal
 from .block_check import BlockDraft
 from .inserted import GatherPiece, gather_block_type, read_values, selected_signal
 from .wire_check import WireCheck

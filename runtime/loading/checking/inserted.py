@@ -18,13 +18,13 @@ from ....files.problems import Code, Problems, listing, nearest
 from ...language.block import Block, Input, Output
 from ...language.delay import DelayParameters, copy_call, delay_block_type
 from ...language.errors import UnitError
+from ...language.flat_graph import FlatWire
 from ...language.parameters import Parameters, parameter
 from ...language.quantities import UNCHECKED, InputQuantities, OutputQuantities, Quantity
 from ...language.signals import Field, Signal
 from ...language.stages import BlockSpec, Wire
 from ...language.unit_algebra import ONE
 from ...language.units import QUANTITY, Unit, parse_quantity, parse_unit
-from ..flattening.flat import FlatWire
 from .block_check import BlockDraft
 
 

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 from ....files.nodes import Entry, MapNode
 from ....files.problems import Code, Position, Problems, listing, nearest
+from ...language.flat_graph import FlatGraph
 from ...language.stages import CheckedGraph, LinkPolicy, LinkSettings
 from ...placement.age import worst_age
 from ...placement.placed import PlacementError, command_sources, silence_limit
-from ..flattening.flat import FlatGraph
 from ..reading.graph_file import LinkKeys, Links, keys_of, read_section
 
 

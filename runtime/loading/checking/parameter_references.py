@@ -14,10 +14,10 @@ from ....files.nodes import MapNode, Node, ScalarNode, from_plain
 from ....files.problems import Code, Problems, listing, nearest
 from ....files.validation import unit_of
 from ...language.block import Block, Clock, Context, UnmetRequirement
+from ...language.flat_graph import FlatBlock, FlatGraph
 from ...language.parameters import Parameters, declared_fields
 from ...language.registry import find_block
 from ...language.requirements import unmet_requirements
-from ..flattening.flat import FlatBlock, FlatGraph
 from .parameters import check_parameters, plain_parameters
 from .settings import Settings
 
@@ -76,6 +76,11 @@ class _ReferenceResolver:
         self.blocks = {block.path: block for block in graph.blocks}
         self.done: dict[str, FlatBlock] = {}
         self.exported: dict[str, Mapping[str, tuple[Any, str]] | None] = {}
+        self.asked: dict[str, set[str]] = {}
+        for reader in graph.blocks:
+            for _, source in _references(reader):
+                path, what = self.source_of(reader, source)
+                self.asked.setdefault(path, set()).add(what)
 
     def resolved(self) -> FlatGraph:
         blocks = tuple(self.block(block.path, ()) for block in self.graph.blocks)
@@ -100,10 +105,9 @@ class _ReferenceResolver:
     ) -> Node | None:  # fmt: skip
         """Return the value that replaces a reference; ``None`` where it is not known."""
         at = f"{reader.path}.{parameter}"
-        name, _, what = str(source.value).rpartition(".")
-        folder = reader.path.rpartition("/")[0]
-        path = next((p for p in (f"{folder}/{name}", name) if p in self.blocks), "")
+        path, what = self.source_of(reader, source)
         if not path:
+            name = str(source.value).rpartition(".")[0]
             self._report_unknown(source, at, f"there is no block {name!r}", name, self.blocks)
             return None
         if path in waiting_blocks:
@@ -155,6 +159,13 @@ class _ReferenceResolver:
             return None
         return from_plain(value, source.where)
 
+    def source_of(self, reader: FlatBlock, source: ScalarNode) -> tuple[str, str]:
+        """Return the path of the block that a reference names, empty if there is none, and the name of the
+        value."""
+        name, _, what = str(source.value).rpartition(".")
+        folder = reader.path.rpartition("/")[0]
+        return next((p for p in (f"{folder}/{name}", name) if p in self.blocks), ""), what
+
     def tells(
         self, path: str, waiting_blocks: tuple[str, ...]
     ) -> Mapping[str, tuple[Any, str]] | None:
@@ -178,6 +189,7 @@ class _ReferenceResolver:
             robot=robot,
             folder=block.folder,
             graph_folder=self.settings.folder,
+            asked=frozenset(self.asked[block.path]),
             graph=self.graph.plain(),
         )
         try:

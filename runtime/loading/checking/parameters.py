@@ -25,13 +25,13 @@ from ....files.problems import Code, LoadError, Position, Problems, listing, nea
 from ....files.validation import find_mistakes, path_text, unit_of, with_unit
 from ....robots.description import RobotDescription
 from ...language.block import Block
+from ...language.flat_graph import FlatBlock
 from ...language.parameter_change import Adjustment
 from ...language.parameters import Parameters, declared_fields, group_of, is_live
 from ...language.per_joint import BY_POSITION, by_name
 from ...language.registry import block_name
 from ...language.requirements import unmet_requirements
 from ...language.signals import Field
-from ..flattening.flat import FlatBlock
 from ..reading.overrides import Override, Overrides, read_overrides
 
 
@@ -84,7 +84,7 @@ def _refuse_truth_values(flat: FlatBlock, model: type[Parameters], problems: Pro
 
 
 def _values(node: MapNode, prefix: str = "") -> Iterator[tuple[str, ScalarNode]]:
-    """The single values in a mapping and in those within it, by path."""
+    """Yield the single values in a mapping and in those within it, by path."""
     for entry in node:
         if isinstance(entry.value, MapNode):
             yield from _values(entry.value, f"{prefix}{entry.key}.")

@@ -16,9 +16,9 @@ from ....robots.description import (
     find_robot,
     robot_names,
 )
+from ...language.flat_graph import FlatGraph
 from ...language.requirements import fix_without_robot
 from ...language.stages import ClockSpec
-from ..flattening.flat import FlatGraph
 from ..reading.graph_file import ClockKeys, read_section
 from ..reading.written import read_quantity
 

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from ....files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, plain, text_of
 from ....files.problems import Code, Position, Problems, listing, nearest
 from ...language.errors import UnitError
+from ...language.flat_graph import FlatBlock, FlatGraph, FlatWire, WireElement, WireSlice
+from ...language.selection import Selection, read_selection, select
 from ...language.signal_error import (
     CONDITION,
     FOLDER,
@@ -31,8 +33,6 @@ from ...language.signal_error import (
 )
 from ...language.signals import Field, Signal
 from ...language.units import parse_quantity
-from ..flattening.flat import FlatBlock, FlatGraph, FlatWire, WireElement, WireSlice
-from ..reading.selection import Selection, read_selection, select
 from .block_check import BlockDraft
 from .inserted import selected_signal
 from .parameters import check_parameters

@@ -10,11 +10,11 @@ from typing import Any
 from ....files.nodes import text_of
 from ....files.problems import Code, Problems, listing, nearest
 from ...language.block import Input, Output
+from ...language.flat_graph import FlatGraph, FlatWire
 from ...language.quantities import UNCHECKED, quantity_of
 from ...language.signals import Field, Signal
 from ...language.unit_algebra import over
 from ...language.units import Unit
-from ..flattening.flat import FlatGraph, FlatWire
 from .block_check import BlockDraft
 
 

@@ -6,10 +6,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from ....files.document import read_file, read_mapping
 from ....files.nodes import Entry, MapNode, Node, ScalarNode, plain
-from ....files.problems import Code, Position, Problems, listing, nearest
+from ....files.problems import Code, Position, Problems
+from ...language.flat_graph import FlatBlock, FlatGraph, FlatWire
 from ..reading.files import FileTree, Stack, addresses_like, is_another_kind
 from ..reading.overrides import (
     Override,
@@ -19,15 +21,21 @@ from ..reading.overrides import (
     read_overrides,
     read_sets,
 )
-from ..reading.written import WrittenBlock, WrittenGraph, read_graph, wrong_kind
-from .flat import FlatBlock, FlatGraph, FlatWire
+from ..reading.written import WrittenBlock, WrittenGraph, read_graph
+from .change import (
+    SUBGRAPH_SUFFIXES,
+    assign,
+    graph_keys,
+    mapping_of,
+    named_use,
+    report_unknown_block,
+)
 from .machines import placed
 from .rates import wrap_offset
 from .subgraphs import Bindings, Instance, Resolver, parameter_values, report_unused
 from .written_wires import WrittenWire, read_wire
 
 _MAXIMAL_BLOCKS = 5000
-_SUFFIXES = (".yaml", ".yml")
 
 
 _GivenWire = tuple[WrittenWire | None, Position, str]
@@ -134,36 +142,23 @@ class _Flattener:
             for draft in self.drafts.values()
         )
 
-        blocks = placed(blocks, self._mapping(graph, "place"), self.instances, self.problems)
+        blocks = placed(
+            blocks, mapping_of(graph, "place", self.problems), self.instances, self.problems
+        )
         return FlatGraph(
             name=path.stem,
             file=shown,
             folder=path.parent,
             blocks=blocks,
-            rate=rate,
-            duration=graph.get("duration"),
-            robot=graph.get("robot"),
-            actuators=graph.get("actuators"),
             robot_folder=robot_folder,
-            dimensions=self._mapping(graph, "dimensions"),
-            clock=self._mapping(graph, "clock"),
-            machines=self._mapping(graph, "machines"),
-            links=self._mapping(graph, "links"),
-            faults=self._mapping(graph, "faults"),
             overrides={command.key: plain(command.value) for command in commands},
             empty=empty and not self.files.incomplete,
             incomplete=self.files.incomplete,
             broken=tuple(p for p, instance in self.instances.items() if instance.broken),
             subgraphs=resolver.outputs(),
             subgraph_inputs=Resolver(self.instances, Problems()).inputs(),
+            **graph_keys(graph, self.problems),
         )
-
-    def _mapping(self, graph: MapNode, key: str) -> MapNode | None:
-        entry = graph.get(key)
-        if entry is None or isinstance(entry.value, MapNode):
-            return entry.value if entry else None  # type: ignore[return-value]  # a MapNode
-        wrong_kind(entry.value, repr(key), "a mapping", self.problems)
-        return None
 
     def _expand(self, files: list[WrittenGraph], scope: _Scope) -> None:
         prefix = scope.prefix
@@ -227,19 +222,7 @@ class _Flattener:
                 continue
             if any(block.startswith(f"{p}/") and i.broken for p, i in self.instances.items()):
                 continue
-            similar = nearest(block, paths)
-            self.problems.add(
-                code,
-                f"{key!r}: there is no block {block!r}",
-                where,
-                at=key,
-                expected=listing(paths),
-                found=block,
-                nearest=similar,
-                fix=(key if where.line else where.file).replace(block, similar[0], 1)
-                if similar
-                else "",
-            )
+            report_unknown_block(key, block, where, paths, self.problems, code)
 
     def _duplicate(self, path: str, where: Position, other: Position) -> None:
         self.problems.add(
@@ -266,59 +249,53 @@ class _Flattener:
     ) -> None:
         """Add a block, or expand a sub-graph; ``sets`` and ``wires`` are what other files give it."""
         path = scope.prefix + block.name
-        if len(self.drafts) >= _MAXIMAL_BLOCKS:
-            self.problems.add(Code.TOO_LARGE, f"more than {_MAXIMAL_BLOCKS} blocks", block.where)
+        if not self._has_room_for(path, block.where):
             return
-        if path in self.drafts or path in self.instances:
-            present = self.drafts[path].block if path in self.drafts else self.instances[path]
-            self._duplicate(path, block.where, present.where)
-            return
-        substitute = scope.bindings.substitute
-        parameters = substitute(block.parameters) if block.parameters else None
-        if not isinstance(parameters, MapNode):
-            parameters = MapNode((), block.where)
-        use = substitute(block.use) if block.use else None
-        for override in sets:
-            if override.path == ("use",):
-                use = override.value
-            else:
-                parameters = parameters.assign(override.path, override.value, override.where)
-        named = isinstance(use, ScalarNode) and isinstance(use.value, str)
-        if use is not None and not named:
-            expected = "a block such as blocks.JointPD, module:Class, or a file.yaml"
-            wrong_kind(use, "'use'", expected, self.problems, at=path)
-        background = substitute(block.background) if block.background else None
-        assert background is None or isinstance(background, MapNode)
+        use, parameters = _overridden(block, scope, sets)
+        name = named_use(use, path, self.problems)
         links, places = self._links(block, file, scope, path, wires)
         draft = _GraphDraft(
             FlatBlock(
                 path,
                 block.where,
-                str(use.value) if isinstance(use, ScalarNode) and named else "",
-                use.where if use is not None and named else block.where,
+                name,
+                use.where if use is not None and name else block.where,
                 file.folder,
                 parameters,
-                rate=substitute(block.rate) if block.rate else scope.rate,
-                offset=substitute(block.offset) if block.offset else scope.offset,
                 input_places=places,
-                machine=substitute(block.machine) if block.machine else scope.machine,
-                background=background,
+                **_timing(block, scope),
             ),
             links,
             block.offset is None and (block.rate is not None or scope.shifted),
         )
-        if draft.block.use.endswith(_SUFFIXES):
-            if background is not None:
-                self.problems.add(
-                    Code.MISPLACED_KEY,
-                    f"{path} uses a sub-graph, and only single blocks work in the background",
-                    background.where,
-                    at=f"{path}.background",
-                    fix="move 'background' to a block of the sub-graph",
-                )
-            self._instance(draft, file, scope)
-        else:
+        if not name.endswith(SUBGRAPH_SUFFIXES):
             self.drafts[path] = draft
+            return
+        self._report_background(draft.block)
+        self._instance(draft, file, scope)
+
+    def _has_room_for(self, path: str, where: Position) -> bool:
+        """Check that the graph is not too large, and that no block has that path yet; report it."""
+        if len(self.drafts) >= _MAXIMAL_BLOCKS:
+            self.problems.add(Code.TOO_LARGE, f"more than {_MAXIMAL_BLOCKS} blocks", where)
+            return False
+        if path in self.drafts or path in self.instances:
+            present = self.drafts[path].block if path in self.drafts else self.instances[path]
+            self._duplicate(path, where, present.where)
+            return False
+        return True
+
+    def _report_background(self, block: FlatBlock) -> None:
+        """Report a sub-graph that should work in the background."""
+        if block.background is None:
+            return
+        self.problems.add(
+            Code.MISPLACED_KEY,
+            f"{block.path} uses a sub-graph, and only single blocks work in the background",
+            block.background.where,
+            at=f"{block.path}.background",
+            fix="move 'background' to a block of the sub-graph",
+        )
 
     def _links(
         self,
@@ -383,6 +360,33 @@ class _Flattener:
         for entry in subgraph.outputs:
             instance.outputs[entry.key] = self._link(entry, inner, f"{path}.{entry.key}")
         self._expand(files, inner)
+
+
+def _overridden(
+    block: WrittenBlock, scope: _Scope, sets: Iterable[Override]
+) -> tuple[Node | None, MapNode]:
+    """Return what a block uses and its parameters, with those of its scope and the overrides."""
+    substitute = scope.bindings.substitute
+    use = substitute(block.use) if block.use else None
+    parameters = substitute(block.parameters) if block.parameters else None
+    if not isinstance(parameters, MapNode):
+        parameters = MapNode((), block.where)
+    for override in sets:
+        use, parameters = assign(use, parameters, override)
+    return use, parameters
+
+
+def _timing(block: WrittenBlock, scope: _Scope) -> dict[str, Any]:
+    """Return when and where a block runs, its own or its scope's, as fields of ``FlatBlock``."""
+    substitute = scope.bindings.substitute
+    background = substitute(block.background) if block.background else None
+    assert background is None or isinstance(background, MapNode)
+    return {
+        "rate": substitute(block.rate) if block.rate else scope.rate,
+        "offset": substitute(block.offset) if block.offset else scope.offset,
+        "machine": substitute(block.machine) if block.machine else scope.machine,
+        "background": background,
+    }
 
 
 def _finish(draft: _GraphDraft, resolver: Resolver) -> FlatBlock:

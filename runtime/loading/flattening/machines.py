@@ -14,10 +14,10 @@ from dataclasses import replace
 
 from ....files.nodes import Entry, MapNode, Node, ScalarNode, kind, text_of
 from ....files.problems import Code, Problems, listing, nearest
+from ...language.flat_graph import FlatBlock, FlatGraph
 from ...language.signal_error import FOLDER
 from ...language.stages import BlockSpec, CheckedGraph, MachineSpec
 from ...transports.registry import EXAMPLE, endpoint_problem, transport_type
-from .flat import FlatBlock, FlatGraph
 from .subgraphs import Instance
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*$")

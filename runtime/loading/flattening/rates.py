@@ -8,9 +8,9 @@ from dataclasses import replace
 from ....files.nodes import Node, ScalarNode, kind
 from ....files.problems import Code, Position, Problems
 from ...language.errors import AloftError
+from ...language.flat_graph import FlatBlock
 from ...language.schedule import hyperperiod
 from ..reading.written import read_quantity
-from .flat import FlatBlock
 
 
 def read_period(flat: FlatBlock, base_rate: float, problems: Problems) -> int:

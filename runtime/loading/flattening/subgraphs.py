@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 
 from ....files.nodes import ListNode, MapNode, Node, ScalarNode, kind, plain, text_of, texts_of
 from ....files.problems import Code, Position, Problems, fix_for_key, listing, nearest
-from ..reading.selection import WHOLE, Selection
+from ...language.flat_graph import FlatBlock, FlatWire, WireElement, WireSlice
+from ...language.selection import WHOLE, Selection
 from ..reading.written import WrittenGraph
-from .flat import FlatBlock, FlatWire, WireElement, WireSlice
 from .written_wires import WrittenWire
 
 UNWIRED = "unwired"

@@ -8,11 +8,11 @@ from difflib import get_close_matches
 
 from ....files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, kind, text_of
 from ....files.problems import Code, Position, Problems, nearest
+from ...language.flat_graph import WireSlice
+from ...language.selection import WHOLE, Selection, read_selection
 from ...language.units import QUANTITY
 from ..reading.graph_file import SOURCE_KEYS, WIRE_KEYS
-from ..reading.selection import WHOLE, Selection, read_selection
 from ..reading.written import unknown_key, wrong_kind
-from .flat import WireSlice
 
 _EXAMPLE = "block.port, block.port.field[2], or {from: block.port, delay: 1}"
 _ITEM_EXAMPLE = "block.port, block.port.field[2], or a number"

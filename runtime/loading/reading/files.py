@@ -16,6 +16,7 @@ from typing import Any
 from ....files.document import read_file
 from ....files.nodes import MapNode, ScalarNode, plain, texts_of
 from ....files.problems import Code, LoadError, Position, Problems, listing, nearest
+from ...language.extensions import extensions
 from .graph_file import COMMON_KEYS, GRAPH_KEYS
 from .written import WrittenGraph, read_graph
 
@@ -24,30 +25,52 @@ Stack = tuple[tuple[Path, str], ...]
 
 PREFIX = "aloft:"
 FOLDER = Path(__file__).parents[3] / "graphs"
+"""The graphs of the core."""
+
+
+def graph_folders() -> dict[str, Path]:
+    """Return the folders of shipped graphs by what their addresses begin with: ``aloft:`` for the core's,
+    ``aloft:hopping/`` for those of an extension."""
+    found = {PREFIX: FOLDER}
+    for each in extensions():
+        if (each.folder / "graphs").is_dir():
+            found[f"{PREFIX}{each.name}/"] = each.folder / "graphs"
+    return found
 
 
 def shipped_graphs() -> dict[str, Path]:
     """Return the files of all shipped graphs by address, such as ``aloft:jump``, sorted."""
-    files = [*FOLDER.glob("*.yaml"), *FOLDER.glob("robots/*.yaml")]
-    by_name = {path.relative_to(FOLDER).with_suffix("").as_posix(): path for path in files}
-    return {f"{PREFIX}{name}": by_name[name] for name in sorted(by_name)}
+    by_address = {
+        f"{prefix}{path.relative_to(folder).with_suffix('').as_posix()}": path
+        for prefix, folder in graph_folders().items()
+        for path in (*folder.glob("*.yaml"), *folder.glob("robots/*.yaml"))
+    }
+    return {address: by_address[address] for address in sorted(by_address)}
 
 
 def graph_path(path: str | Path, folder: Path = Path()) -> Path:
-    """Return the file that a path, seen from ``folder``, or an address stands for; an unknown
-    address is no file."""
+    """Return the file that a path, seen from ``folder``, or an address stands for; an unknown address is no file."""
     text = str(path)
     if not text.startswith(PREFIX):
         return folder / path
-    file = FOLDER / f"{text.removeprefix(PREFIX).removesuffix('.yaml')}.yaml"
-    return file if file.is_file() and ".." not in file.parts else Path(path)
+    name = f"{text.removesuffix('.yaml')}.yaml"
+    if ".." in Path(name.removeprefix(PREFIX)).parts:
+        return Path(path)
+    core = FOLDER / name.removeprefix(PREFIX)
+    if core.is_file():
+        return core
+    for prefix, place in graph_folders().items():
+        if name.startswith(prefix) and (file := place / name.removeprefix(prefix)).is_file():
+            return file
+    return Path(path)
 
 
 def addresses_like(path: Path) -> tuple[str, ...]:
     """Return the addresses of shipped files that may be meant by a path where there is no file."""
     known = {
-        f"{PREFIX}{file.relative_to(FOLDER).with_suffix('').as_posix()}"
-        for file in FOLDER.rglob("*.yaml")
+        f"{prefix}{file.relative_to(folder).with_suffix('').as_posix()}"
+        for prefix, folder in graph_folders().items()
+        for file in folder.rglob("*.yaml")
     }
     wanted = f"{PREFIX}{str(path.with_suffix('')).removeprefix(PREFIX).removeprefix('graphs/')}"
     return (wanted,) if wanted in known else nearest(wanted, sorted(known))

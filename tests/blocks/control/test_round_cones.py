@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aloft.benchmarks.full_program import rows_without_pyramids
 from aloft.blocks.control.dynamics import Dynamics
 from aloft.blocks.control.whole_body_controller import WholeBodyController
 from aloft.blocks.signals import Phase
+from aloft.lab.benchmarks.full_program import rows_without_pyramids
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aloft.benchmarks.full_program import FullProgram
 from aloft.blocks.control.dynamics import Dynamics
 from aloft.blocks.control.whole_body_controller import (
     ActiveCalls,
@@ -20,6 +19,7 @@ from aloft.blocks.control.whole_body_controller import (
     keep_solution,
 )
 from aloft.blocks.signals import Phase
+from aloft.lab.benchmarks.full_program import FullProgram
 from aloft.mathematics.whole_body_qp import ILL_POSED, NOT_FOUND, SOLVED
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError

@@ -14,9 +14,9 @@ import pytest
 import quadprog
 
 import aloft
-from aloft.benchmarks.full_program import FullProgram
 from aloft.blocks.control.whole_body_controller import WholeBodyController
 from aloft.blocks.control.whole_body_solver import ExternalSolver
+from aloft.lab.benchmarks.full_program import FullProgram
 from aloft.mathematics.active_set import INFEASIBLE
 from aloft.mathematics.quadratic_program import QuadraticProgramSolver
 from aloft.mathematics.whole_body_qp import SOLVED

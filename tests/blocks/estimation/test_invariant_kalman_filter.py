@@ -18,7 +18,7 @@ from aloft.robots.contact_kinematics import ContactKinematics
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import ball_feet
 from aloft.runtime.language.errors import BlockError
-from aloft.runtime.loading import LoadError, load
+from aloft.runtime.loading import LoadError, checked_file
 from aloft.runtime.testing import BlockBench
 
 from ...turns import quaternion_of, turn_in_body
@@ -384,6 +384,6 @@ def test_no_start_where_the_ground_leans():
     jump = shipped_folder() / "jump.yaml"
     task = {"name": "odd", "rise": 0.1, "slope": ["5 deg", 0]}
     with pytest.raises(LoadError, match="takes the ground on which it begins for level") as error:
-        load(jump, {"plan.task": task, "estimator.use": "blocks.InvariantKalmanFilter"})
+        checked_file(jump, {"plan.task": task, "estimator.use": "blocks.InvariantKalmanFilter"})
     assert "ground that rises by 5 deg ahead and 0 deg to the left" in str(error.value)
     assert "estimator.use: blocks.StateEstimator" in str(error.value)

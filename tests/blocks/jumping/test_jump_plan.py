@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import aloft
 from aloft.blocks.jumping.jump_plan import JumpPlan, TriggeredJumpPlan
 from aloft.blocks.signals import Phase
 from aloft.planner.library.library import SHIPPED, PlanLibrary
@@ -196,3 +197,22 @@ def test_after_the_trigger_it_is_the_plan_of_a_run_that_begins(ahead: float) -> 
         assert float(mine.time) == pytest.approx(float(other.time), abs=1e-9)
         assert mine.phase == other.phase
         assert mine.com == pytest.approx(other.com, abs=1e-9)
+
+
+def test_a_graph_that_is_loaded_and_run_reads_its_task_once(tmp_path, monkeypatch):
+    from aloft.planner.task import read_task as reading
+
+    graphs = Path(__file__).parents[3] / "graphs"
+    task = (graphs / "tasks" / "in_situ.yaml").read_text()
+    (tmp_path / "mine.yaml").write_text(task)
+    read = []
+    read_located = reading.read_located
+    monkeypatch.setattr(
+        reading, "read_located", lambda path, text: read.append(path) or read_located(path, text)
+    )
+    own = {"plan.task": str(tmp_path / "mine.yaml")}
+    aloft.load(graphs / "jump.yaml", own).run(0.01, log=False)
+    assert [path.name for path in read] == ["mine.yaml"]
+    (tmp_path / "mine.yaml").write_text(task + "# another content\n")
+    aloft.load(graphs / "jump.yaml", own).run(0.01, log=False)
+    assert len(read) == 2

@@ -162,8 +162,8 @@ def test_the_shipped_file_is_not_armed() -> None:
     with pytest.raises(BusError) as caught:
         driver.arm(lambda: True)
     assert str(caught.value) == (
-        "the drives are not enabled: no motor has an `offset`: do step 3 of docs/bring_up.md; no motor "
-        "has `low` and `high`: do step 4 of docs/bring_up.md"
+        "the drives are not enabled: no motor has an `offset`: do step 3 of extensions/commissioning/bring_up.md; no motor "
+        "has `low` and `high`: do step 4 of extensions/commissioning/bring_up.md"
     )
 
 

@@ -11,7 +11,7 @@ from aloft.hal.simulated.contact_bias import ContactBias
 from aloft.hal.simulated.mujoco_model import build_mujoco_model
 from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.simulated.physics_step import step_calls
-from aloft.hal.simulated.stance import place_standing
+from aloft.hal.simulated.stance import set_standing_pose
 from aloft.hal.simulated.variation import Variation
 from aloft.mathematics.arrays import Array
 from aloft.robots.description import find_robot
@@ -72,7 +72,7 @@ def place_standing_on(
 ) -> None:
     base = BASES[ROBOT.base_joint](data)
     normal = params.build_scene(ROBOT).normal(0.0, 0.0)
-    place_standing(model, data, base, ROBOT, np.zeros(3), False, normal)
+    set_standing_pose(model, data, base, ROBOT, np.zeros(3), False, normal)
     base.shift(np.array([0.0, 0.0, -2e-4]))
     mujoco.mj_step1(model, data)
 

@@ -15,9 +15,9 @@ from aloft.logs import RecordingError, read
 from aloft.logs.file.repair import repair
 from aloft.logs.recording.recorder import Recorder
 from aloft.runtime.language.stages import CheckedGraph
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.running.executor import Executor
-from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.running.sink import Sink
 
 pytestmark = pytest.mark.long
 
@@ -33,27 +33,21 @@ TICKS = 6000
 
 def graph(folder: Path, seconds: float = TICKS / 1000) -> CheckedGraph:
     (folder / "graph.yaml").write_text(GRAPH.format(seconds=seconds))
-    return load(folder / "graph.yaml")
+    return checked_file(folder / "graph.yaml")
 
 
-class KillLater:
+class KillLater(Sink):
     """A sink that kills the recorder a random time after a random tick."""
 
     def __init__(self, recorder: Recorder, moment: random.Random) -> None:
         self.recorder, self.tick = recorder, moment.randrange(TICKS)
         self.wait = moment.uniform(0.0, 0.6)
 
-    def open(self, bound: BoundGraph) -> None:
-        """Nothing."""
-
     def record(self, tick: int) -> None:
         if tick == self.tick:
             time.sleep(self.wait)
             assert self.recorder.link is not None
             os.kill(self.recorder.link.process_id, signal.SIGKILL)
-
-    def close(self) -> None:
-        """Nothing."""
 
 
 @pytest.mark.parametrize("number", range(4))
@@ -84,10 +78,10 @@ def test_the_run_is_killed(number: int, tmp_path: Path) -> None:
     path, moment = tmp_path / "run.rrd", random.Random(100 + number)
     script = (
         "from aloft.logs.recording.recorder import Recorder\n"
-        "from aloft.runtime.loading import load\n"
+        "from aloft.runtime.loading import checked_file\n"
         "from aloft.runtime.running.executor import Executor\n"
         f"recorder = Recorder({str(path)!r}, flush_period=0.05)\n"
-        f"Executor(load({str(tmp_path / 'graph.yaml')!r}), sinks=[recorder], log=False).run()\n"
+        f"Executor(checked_file({str(tmp_path / 'graph.yaml')!r}), sinks=[recorder], log=False).run()\n"
     )
     process = subprocess.Popen([sys.executable, "-c", script])
     try:

@@ -13,7 +13,7 @@ import pytest
 
 from aloft.logs import read
 from aloft.logs.exporting.export import export
-from aloft.logs.recording import place as remedies
+from aloft.logs.recording import output_file as remedies
 from aloft.logs.recording.output_file import remedy
 from aloft.logs.recording.ring import ALIGNMENT, CONTROL, fitting_capacity
 

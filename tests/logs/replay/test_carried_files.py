@@ -15,7 +15,7 @@ from aloft.logs.replay.opened_run import OpenedRun, restored
 from aloft.logs.replay.replay import replay
 from aloft.robots.description import find_robot, read_description, robot_names
 from aloft.runtime.language.stages import CheckedGraph
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file, flattened_text
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 
@@ -80,7 +80,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "kept").mkdir()
     (tmp_path / "kept" / "one.txt").write_text("7")
     monkeypatch.chdir(tmp_path)
-    record(load("graph.yaml"), tmp_path / "run.rrd")
+    record(checked_file("graph.yaml"), tmp_path / "run.rrd")
     return tmp_path
 
 
@@ -133,7 +133,7 @@ def test_a_large_file_is_named_and_not_carried(
     project: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("aloft.logs.file.dependencies.MOST_CARRIED", 4)
-    record(load("graph.yaml"), project / "large.rrd")
+    record(checked_file("graph.yaml"), project / "large.rrd")
     header = read(project / "large.rrd").header
     assert len(header.files) == 2
     assert header.contents == {}
@@ -146,18 +146,18 @@ def test_a_robot_is_restored_where_it_is_another(name: str, tmp_path: Path) -> N
     nothing = RecordedLayout((), {}, {}, 0)
     text = f"rate: 500 Hz\nrobot: {name}\nblocks: {{}}\n"
     header = Header("graph", text, 500.0, nothing, nothing, b"", robot=other)
-    found = restored(header, text, Path(), tmp_path)
+    found = restored(header, flattened_text(text, "graph.yaml"), tmp_path)
     (said,) = found.said
     assert said == (
         f"the description of the robot {name} is not the recorded one any more, or is not there; "
         "the recorded one is used"
     )
-    written = yaml.safe_load(found.text)["robot"]
+    written = found.overrides["robot"]
     again = read_description(Path(written))
     assert again.model_dump(mode="json") == other.model_dump(mode="json")
 
     same = Header("graph", text, 500.0, nothing, nothing, b"", robot=robot)
-    assert restored(same, text, Path(), tmp_path).text == text
+    assert restored(same, flattened_text(text, "graph.yaml"), tmp_path).overrides == {}
 
 
 def test_a_jump_is_replayed_with_its_recorded_plan(tmp_path: Path) -> None:
@@ -165,7 +165,7 @@ def test_a_jump_is_replayed_with_its_recorded_plan(tmp_path: Path) -> None:
     for folder in ("tasks", "controllers", "trials"):
         shutil.copytree(graphs / folder, tmp_path / folder)
     (tmp_path / "jump.yaml").write_text((graphs / "jump.yaml").read_text())
-    record(load(tmp_path / "jump.yaml", ["duration=0.1 s"]), tmp_path / "run.rrd")
+    record(checked_file(tmp_path / "jump.yaml", ["duration=0.1 s"]), tmp_path / "run.rrd")
     task = yaml.safe_load((tmp_path / "tasks/in_situ_12cm.yaml").read_text())
     (tmp_path / "tasks/in_situ_12cm.yaml").write_text(yaml.safe_dump({**task, "rise": "9 cm"}))
     opened = OpenedRun.of(tmp_path / "run.rrd")

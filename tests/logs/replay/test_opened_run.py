@@ -16,12 +16,12 @@ from aloft.logs.recording.writer import RecordingWriter
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import Keyframes, replay
 from aloft.runtime.language.errors import AloftError
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.run_result import RunResult
-from aloft.runtime.running.sinks import parameter_note
+from aloft.runtime.running.sink import Sink, parameter_note
 
 GRAPH = """
 rate: 200 Hz
@@ -49,7 +49,7 @@ class Fragile(arithmetic.Gain):
 """
 
 
-class Tune:
+class Tune(Sink):
     """A sink that changes the gain twice, once in the tick of a keyframe."""
 
     def open(self, bound: BoundGraph) -> None:
@@ -60,14 +60,13 @@ class Tune:
             value = 0.1 if tick == 139 else 1 / 3
             self.bound.parameters.requests.append(adjust(self.bound.blocks, {"gain.gain": value}))
 
-    def close(self) -> None:
-        pass
-
 
 def record(folder: Path, **settings: Any) -> RunResult:
     (folder / "sum.yaml").write_text(GRAPH)
     (folder / "parts.py").write_text(PARTS)
-    graph = load(folder / "sum.yaml", {f"gain.{key}": value for key, value in settings.items()})
+    graph = checked_file(
+        folder / "sum.yaml", {f"gain.{key}": value for key, value in settings.items()}
+    )
     keyframes = Keyframes(100)
     result = Executor(graph, sinks=[keyframes, Tune()]).run()
     log = result.log

@@ -13,10 +13,11 @@ from aloft.logs.recording.writer import write_recording
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.regression import capture, write_test
 from aloft.logs.replay.replay import KeptRun, Keyframes, ReplayError
-from aloft.runtime.loading import load, load_text
+from aloft.runtime.loading import checked_file, checked_text
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.running.sink import Sink
 from aloft.runtime.testing import StretchError
 
 GRAPH = """
@@ -50,7 +51,7 @@ class Adder(Block):
 """
 
 
-class ChangeShare:
+class ChangeShare(Sink):
     """A sink that changes a parameter at tick 160."""
 
     def open(self, bound: BoundGraph) -> None:
@@ -60,16 +61,13 @@ class ChangeShare:
         if tick == 159:
             self.bound.parameters.requests.append(adjust(self.bound.blocks, ["total.share=0.25"]))
 
-    def close(self) -> None:
-        pass
-
 
 @pytest.fixture
 def recorded(tmp_path: Path) -> KeptRun:
     (tmp_path / "adder.py").write_text(ADDER)
     (tmp_path / "sum.yaml").write_text(GRAPH)
     keyframes = Keyframes(100)
-    result = Executor(load(tmp_path / "sum.yaml"), sinks=[keyframes, ChangeShare()]).run()
+    result = Executor(checked_file(tmp_path / "sum.yaml"), sinks=[keyframes, ChangeShare()]).run()
     result.raise_if_failed()
     write_recording(tmp_path / "sum.rrd", result)
     return KeptRun.of(result, keyframes)
@@ -149,7 +147,7 @@ def test_a_block_in_the_background_is_refused() -> None:
         'use: "adder:Adder", with: {n: 2}',
         "use: blocks.Gain, with: {n: 2}, background: {latency: 40 ms}",
     )
-    graph = load_text(text, "graph.yaml")
+    graph = checked_text(text, "graph.yaml")
     keyframes = Keyframes(5)
     kept = KeptRun.of(Executor(graph, sinks=[keyframes]).run(10), keyframes)
     with pytest.raises(ReplayError, match="block 'total' works in the background"):

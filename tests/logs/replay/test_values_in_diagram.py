@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.extensions.studio.diagram.page import page_server
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.replay.opened_run import OpenedRun, TickValues
-from aloft.runtime.drawing.page import page_server, shown
+from aloft.logs.viewing.signal_names import value_text
 from aloft.runtime.running.run_result import RunResult
 
 GRAPH = """\
@@ -39,7 +40,7 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunResult, OpenedRun]
 @pytest.fixture
 def base(ran: tuple[RunResult, OpenedRun]) -> Iterator[str]:
     _, opened = ran
-    server = page_server(opened.load(), values=TickValues(opened.file))
+    server = page_server(opened.graph, values=TickValues(opened.file))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     yield f"http://127.0.0.1:{server.server_address[1]}"
     server.shutdown()
@@ -75,7 +76,7 @@ def test_the_page_asks_for_the_values_of_a_tick(
 
 
 def test_a_page_without_a_run_has_no_slider(ran: tuple[RunResult, OpenedRun]) -> None:
-    server = page_server(ran[1].load())
+    server = page_server(ran[1].graph)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     base = f"http://127.0.0.1:{server.server_address[1]}"
     try:
@@ -110,4 +111,4 @@ def test_a_browser_shows_the_values(base: str, tmp_path: Path) -> None:
     ],
 )
 def test_how_numbers_are_shown(value: np.ndarray, text: str) -> None:
-    assert shown(value, "m") == text
+    assert value_text(value, "m") == text

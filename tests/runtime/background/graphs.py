@@ -5,7 +5,7 @@ from typing import Any
 
 from aloft.files.nodes import text_of
 from aloft.runtime.language.stages import CheckedGraph
-from aloft.runtime.loading import load_text
+from aloft.runtime.loading import checked_text
 from aloft.runtime.running.executor import run
 
 PLACE = Path(__file__).parent / "graph.yaml"
@@ -65,7 +65,7 @@ def both(
             },
         }
         text = "".join(f"{key}: {text_of(value)}\n" for key, value in graph.items())
-        graphs.append(load_text(text, PLACE))
+        graphs.append(checked_text(text, PLACE))
     return graphs[0], graphs[1]
 
 

@@ -67,7 +67,7 @@ def test_blocks_of_packages(tmp_path: Path) -> None:
     for package, name, text in (("one", "a", SOURCE), ("two", "b", OTHER)):
         (tmp_path / package / "inner").mkdir(parents=True)
         (tmp_path / package / "inner" / f"{name}.py").write_text(text)
-    found = blocks_in_packages(tmp_path, ("one", "two"))
+    found = blocks_in_packages({name: tmp_path / name for name in ("one", "two")})
     assert list(found) == ["one.Calls", "one.Late", "one.Whole", "two.Other"]
     assert found["two.Other"] == tmp_path / "two" / "inner" / "b.py"
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from aloft.extensions.ros2.node import NodeAddress, join
 from aloft.planner.solving.solve import solve_jump
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
-from aloft.ros2.node import NodeAddress, join
 from aloft.runtime.language.errors import MissingExtraError, need_extra
 
 ROOT = Path(__file__).parents[3]

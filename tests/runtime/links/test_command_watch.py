@@ -9,7 +9,7 @@ from aloft.files.problems import Code
 from aloft.runtime.language.stages import WATCHDOG, CheckedGraph, LinkPolicy, LinkSettings
 from aloft.runtime.links.command_watch import CommandWatch
 from aloft.runtime.links.part import BoundPart
-from aloft.runtime.loading import LoadError, load
+from aloft.runtime.loading import LoadError, checked_file
 from aloft.runtime.placement.placed import (
     MachineLink,
     command_sources,
@@ -141,9 +141,9 @@ def test_in_lockstep_messages_count_when_they_come() -> None:
 
 def test_a_link_too_slow_to_be_watched_is_refused_at_load() -> None:
     two = "graphs/machines/jump_two.yaml"
-    assert load(two, ["links.watchdog=4 ms"]).links.watchdog == 0.004
+    assert checked_file(two, ["links.watchdog=4 ms"]).links.watchdog == 0.004
     with pytest.raises(LoadError) as caught:
-        load(two, ["links.watchdog=3 ms", "links.of.legs.watch=false"])
+        checked_file(two, ["links.watchdog=3 ms", "links.of.legs.watch=false"])
     problems = caught.value.report.problems
     assert [p.message for p in problems if p.message.startswith(("wbc ", "legs "))] == [
         "wbc brings commands to onboard every 2 ms, so one message that is lost would count as silence"

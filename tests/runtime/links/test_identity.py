@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from aloft.runtime.links.identity import Identity
-from aloft.runtime.loading import load_text
+from aloft.runtime.loading import checked_text
 from aloft.runtime.placement.placed import split_over_machines
 
 TEXT = """
@@ -16,7 +16,7 @@ blocks:
 
 
 def identity(text: str) -> Identity:
-    return Identity.of(split_over_machines(load_text(text, Path("graph.yaml"))))
+    return Identity.of(split_over_machines(checked_text(text, Path("graph.yaml"))))
 
 
 def test_the_same_graph() -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from aloft.runtime.language.errors import AloftError, ExitCode
 from aloft.runtime.links.part import BoundPart
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.placement.placed import split_over_machines, spread
 from aloft.runtime.running.executor import run
@@ -59,7 +59,7 @@ def test_the_random_graphs_go_forth_and_back_within_a_tick() -> None:
 
 def test_a_jump_in_a_random_split() -> None:
     rng = np.random.default_rng(0)
-    graph = load(GRAPHS / "jump.yaml", {"robot.seed": 3})
+    graph = checked_file(GRAPHS / "jump.yaml", {"robot.seed": 3})
     machines = endpoints("a", "b", "c")
     places = {spec.path: str(rng.choice(list(machines))) for spec in graph.blocks}
     alone = run(graph, 60)  # first: compiling kernels takes longer than parts wait for each other

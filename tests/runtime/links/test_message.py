@@ -14,7 +14,7 @@ from aloft.runtime.links.message import (
     schema_of,
     spans_of,
 )
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.placement.placed import MachineLink, PlacedGraph, split_over_machines
 from aloft.runtime.running.memory import Memory
 
@@ -24,7 +24,7 @@ RUN = b"12345678"
 @pytest.fixture(scope="module")
 def placed() -> PlacedGraph:
     return split_over_machines(
-        load(Path(__file__).parents[3] / "graphs" / "machines" / "jump_two.yaml")
+        checked_file(Path(__file__).parents[3] / "graphs" / "machines" / "jump_two.yaml")
     )
 
 

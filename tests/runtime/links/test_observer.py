@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aloft.extensions.deployment.keys import make_keys
 from aloft.runtime.language.stages import LinkPolicy, LinkSettings, MachineSpec
 from aloft.runtime.links.observer import ROW_HEADER, Observer, StatusPublisher, read_row
 from aloft.runtime.links.part import BoundPart, run_part
 from aloft.runtime.placement.placed import PlacedGraph, split_over_machines, spread
 from aloft.runtime.running.run_result import RunResult
-from aloft.runtime.transports.keys import make_keys, secured
+from aloft.runtime.transports.tls import secured
 from aloft.runtime.transports.zenoh_transport import ZenohTransport
 
 from ...waiting import free_port

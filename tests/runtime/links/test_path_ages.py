@@ -15,7 +15,7 @@ from aloft.runtime.graph import Graph
 from aloft.runtime.language.errors import ExitCode
 from aloft.runtime.language.stages import CheckedGraph, LinkPolicy
 from aloft.runtime.links.path_ages import NAME, check_path_ages, path_sinks, timeline_of
-from aloft.runtime.loading import load_text
+from aloft.runtime.loading import checked_text
 from aloft.runtime.placement.placed import split_over_machines
 from aloft.runtime.running.executor import run
 from aloft.runtime.running.memory import BoundGraph
@@ -52,7 +52,7 @@ class Late:
 
 
 def checked(text: str = GRAPH) -> CheckedGraph:
-    return load_text(text, Path("graph.yaml"))
+    return checked_text(text, Path("graph.yaml"))
 
 
 def test_a_pause_is_no_age() -> None:

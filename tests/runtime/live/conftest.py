@@ -2,16 +2,13 @@
 
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from aloft.runtime.live.live_run import LiveRun
-from aloft.runtime.live.live_server import LiveServer
 from aloft.runtime.live.parameter_endpoint import ParameterEndpoint
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.run_result import RunResult
@@ -55,7 +52,7 @@ class Running:
 
 def start(file: Path, path: Path, *, paused: bool = False) -> Running:
     """Run the graph in ``file``; it answers at ``path``, and may begin ``paused``."""
-    bound = BoundGraph(load(file))
+    bound = BoundGraph(checked_file(file))
     executor = Executor(
         bound, log=False, plain=True, sinks=[ParameterEndpoint(path, paused=paused)]
     )
@@ -70,16 +67,6 @@ def write_graph(folder: Path) -> Path:
     (folder / "part.yaml").write_text(PART)
     (folder / "waves.yaml").write_text(GRAPH)
     return folder / "waves.yaml"
-
-
-@contextmanager
-def serving(live: LiveRun, save: Path) -> Iterator[LiveServer]:
-    """The page of a graph that runs, served in a thread."""
-    made = LiveServer(live, save)
-    threading.Thread(target=made.serve_forever, args=(0.02,), daemon=True).start()
-    yield made
-    made.shutdown()
-    made.server_close()
 
 
 @pytest.fixture
@@ -98,17 +85,3 @@ def running(graph_file: Path, socket_path: Path) -> Iterator[Running]:
     run = start(graph_file, socket_path)
     yield run
     run.stop()
-
-
-@pytest.fixture
-def live(running: Running) -> Iterator[LiveRun]:
-    run = LiveRun(running.path)
-    yield run
-    run.close()
-
-
-@pytest.fixture
-def server(live: LiveRun, tmp_path: Path) -> Iterator[LiveServer]:
-    """The page of the graph that runs, served in a thread."""
-    with serving(live, tmp_path / "waves-tuned.yaml") as made:
-        yield made

@@ -13,7 +13,7 @@ import pytest
 
 from aloft.runtime.live.part_feed import _HEAD, PartFeed, packed, read_part
 from aloft.runtime.live.window import digest
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.transports.transport import window_key
@@ -47,7 +47,7 @@ def wait_until(holds: Any) -> None:
 @pytest.fixture
 def messages(graph_file: Path) -> tuple[BoundGraph, Kept]:
     """What a run sends that is told to end."""
-    bound, transport = BoundGraph(load(graph_file)), Kept()
+    bound, transport = BoundGraph(checked_file(graph_file)), Kept()
     sender: Any = transport
 
     class Disconnecting(PartFeed):
@@ -119,6 +119,6 @@ def test_a_transport_that_fails_hinders_nothing(graph_file: Path) -> None:
     broken = Broken()
     broken.is_open = True
     sender: Any = broken
-    bound = BoundGraph(load(graph_file))
+    bound = BoundGraph(checked_file(graph_file))
     result = Executor(bound, log=False, plain=True, sinks=[PartFeed("near", sender)]).run(100)
     assert result.success and result.warnings == () and broken.keys

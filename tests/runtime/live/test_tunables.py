@@ -7,13 +7,13 @@ import pytest
 
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.live.tunables import FIRST_LINE, Tunables, write_overlay
-from aloft.runtime.loading import load, load_text
+from aloft.runtime.loading import checked_file, checked_text
 from aloft.runtime.loading.checking.parameters import entries
 from aloft.runtime.running.memory import BoundGraph
 
 
 def rows(source: Path | str, *overrides: str) -> dict[str, dict[str, Any]]:
-    graph = load(source, list(overrides))
+    graph = checked_file(source, list(overrides))
     listed = [vars(entry) for entry in entries(BoundGraph(graph).blocks) if entry.live]
     return {row["path"]: row for row in Tunables(graph).rows(listed)}
 
@@ -63,7 +63,10 @@ def test_it_includes_the_graph_and_sets_what_changed(graph_file: Path) -> None:
     folder = graph_file.parent / "tuned"
     folder.mkdir()
     path = folder / "fast.yaml"
-    assert write_overlay(path, load(graph_file), ROWS) == ["wave.frequency", "inner/twice.gain"]
+    assert write_overlay(path, checked_file(graph_file), ROWS) == [
+        "wave.frequency",
+        "inner/twice.gain",
+    ]
     assert path.read_text().splitlines() == [
         FIRST_LINE,
         'include: ["../waves.yaml"]',
@@ -71,16 +74,16 @@ def test_it_includes_the_graph_and_sets_what_changed(graph_file: Path) -> None:
         "  wave.frequency: 5.0  # was 2.0 Hz",
         "  inner/twice.gain: [1.5, 2.5]  # was 2.0",
     ]
-    graph = load(path)
+    graph = checked_file(path)
     assert graph.block("wave").params.frequency == 5.0  # type: ignore[attr-defined]
     assert graph.block("inner/twice").params.gain == [1.5, 2.5]  # type: ignore[attr-defined]
     assert graph.base_rate == 200.0
-    write_overlay(path, load(graph_file), ROWS[:1])
+    write_overlay(path, checked_file(graph_file), ROWS[:1])
     assert "twice" not in path.read_text(), "its own file is replaced"
 
 
 def test_what_is_refused(graph_file: Path) -> None:
-    graph, path = load(graph_file), graph_file.parent / "other.yaml"
+    graph, path = checked_file(graph_file), graph_file.parent / "other.yaml"
     with pytest.raises(AloftError, match="no parameter has another value than when the run began"):
         write_overlay(path, graph, ROWS[1:2])
     path.write_text("rate: 1 Hz\n")
@@ -93,4 +96,4 @@ def test_what_is_refused(graph_file: Path) -> None:
         write_overlay(path, graph, [row("wave.frequency", -1.0, 2.0)])
     text = "rate: 1 Hz\nblocks: {a: {use: blocks.Constant, with: {value: [7]}}}"
     with pytest.raises(AloftError, match="not run from a file that is still there"):
-        write_overlay(path, load_text(text, "nowhere.yaml"), ROWS)
+        write_overlay(path, checked_text(text, "nowhere.yaml"), ROWS)

@@ -16,7 +16,7 @@ from aloft.runtime.live.window import (
     WindowLayout,
     WindowReader,
 )
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph, nameless_memory
 from aloft.runtime.running.timing import STAMPED_TICKS
@@ -42,7 +42,7 @@ class Kept(Window):
 
 
 def test_the_last_tick_its_bus_and_its_times_are_read(graph_file: Path) -> None:
-    bound = BoundGraph(load(graph_file, ["clock.kind=free"]))
+    bound = BoundGraph(checked_file(graph_file, ["clock.kind=free"]))
     window = Kept()
     result = Executor(bound, log=False, plain=True, sinks=[window]).run(200)
     assert result.success and window.reader is not None
@@ -60,7 +60,7 @@ def test_the_last_tick_its_bus_and_its_times_are_read(graph_file: Path) -> None:
 
 
 def test_before_a_round_of_stamps_is_full_only_those_there_are_read(graph_file: Path) -> None:
-    bound = BoundGraph(load(graph_file, ["clock.kind=free"]))
+    bound = BoundGraph(checked_file(graph_file, ["clock.kind=free"]))
     window = Kept()
     Executor(bound, log=False, plain=True, sinks=[window]).run(5)
     assert window.reader is not None
@@ -81,7 +81,7 @@ def test_a_writer_that_stopped_within_a_tick_is_noticed() -> None:
 def test_rows_are_never_mixed(graph_file: Path) -> None:
     """The gain doubles the wave in every tick, and so it does in every look."""
     window = Window()
-    bound = BoundGraph(load(graph_file, ["clock.kind=free"]))
+    bound = BoundGraph(checked_file(graph_file, ["clock.kind=free"]))
     executor = Executor(bound, log=False, plain=True, sinks=[window])
     thread = threading.Thread(target=executor.run)
     thread.start()

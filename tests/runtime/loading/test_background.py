@@ -6,8 +6,8 @@ import pytest
 
 from aloft.files.problems import Code, Problem
 from aloft.runtime.background.background_block import BackgroundBlock
-from aloft.runtime.loading import check, load, load_text
-from aloft.runtime.loading.load import LoadError
+from aloft.runtime.loading import check, checked_file, checked_text
+from aloft.runtime.loading.checked import LoadError
 from aloft.runtime.placement.age import worst_age
 
 GRAPH = """
@@ -30,23 +30,23 @@ def graph(background: str, text: str = GRAPH) -> str:
 
 def problems(background: str, text: str = GRAPH) -> list[Problem]:
     with pytest.raises(LoadError) as error:
-        load_text(graph(background, text), "graph.yaml")
+        checked_text(graph(background, text), "graph.yaml")
     return list(error.value.report.problems)
 
 
 def test_the_block_is_a_delay_of_so_many_runs() -> None:
-    checked = load_text(graph("{latency: 60 ms, late: hold}"), "graph.yaml")
+    checked = checked_text(graph("{latency: 60 ms, late: hold}"), "graph.yaml")
     kind = checked.block("slow").block_type
     assert issubclass(kind, BackgroundBlock)
     assert (kind.is_moore(), kind.delay_runs, kind.__name__) == (True, 15, "Gain")
-    assert load_text(checked.text, "graph.yaml").text == checked.text
+    assert checked_text(checked.text, "graph.yaml").text == checked.text
     assert "background: {latency: 60 ms, late: hold}" in checked.text
 
 
 def test_ages_of_paths_count_the_latency() -> None:
     loop = graph("{latency: 60 ms}").replace("    background: {latency: 60 ms}\n", "")
     ages = [
-        worst_age(load_text(text, "graph.yaml"), "wave.y", "out.u")
+        worst_age(checked_text(text, "graph.yaml"), "wave.y", "out.u")
         for text in (loop, graph("{latency: 60 ms}"))
     ]
     assert ages[0] == pytest.approx(0.004)
@@ -103,7 +103,7 @@ def test_what_is_wrong_is_named(background: str, code: Code, message: str) -> No
 
 def test_it_breaks_a_loop() -> None:
     text = GRAPH.replace("{u: wave.y}", "{u: out.y}")
-    assert load_text(graph("{latency: 4 ms}", text), "graph.yaml").order
+    assert checked_text(graph("{latency: 4 ms}", text), "graph.yaml").order
     (found,) = problems("", text.replace("    background: BACKGROUND\n", ""))
     assert found.code is Code.LOOP
 
@@ -131,7 +131,7 @@ def test_a_parameter_of_a_sub_graph_may_be_the_latency(tmp_path: Path) -> None:
     main = tmp_path / "main.yaml"
     blocks = "wave: {use: blocks.SineWave}, part: {use: part.yaml, with: {latency: 6 ms}, in: {u: wave.y}}"
     main.write_text(f"rate: 500 Hz\nblocks: {{{blocks}}}\n")
-    assert load(main).block("part/slow").block_type.delay_runs == 3
+    assert checked_file(main).block("part/slow").block_type.delay_runs == 3
     main.write_text(
         f"rate: 500 Hz\nblocks: {{{blocks.replace('with:', 'background: {latency: 6 ms}, with:')}}}\n"
     )

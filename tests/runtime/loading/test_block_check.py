@@ -10,7 +10,7 @@ from aloft.runtime.language.block import Clock, Context, UnmetRequirement
 from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.language.registry import find_block
 from aloft.runtime.language.requirements import fix_without_robot, has, unmet_requirements
-from aloft.runtime.loading import LoadError, load_text
+from aloft.runtime.loading import LoadError, checked_text
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing.bench import BlockBench
@@ -65,7 +65,7 @@ def test_the_bench_refuses_what_a_load_refuses() -> None:
 
 
 def test_values_per_joint_may_change_while_a_graph_runs() -> None:
-    graph = BoundGraph(load_text(blocks("soft: {use: parts:LiveSprings}"), WRONG / "graph.yaml"))
+    graph = BoundGraph(checked_text(blocks("soft: {use: parts:LiveSprings}"), WRONG / "graph.yaml"))
     found = adjust(graph.blocks, ["soft.stiffness.*_knee=60"])
     stiffness = found.params["soft"].stiffness  # type: ignore[attr-defined]
     assert stiffness.root == {"*": 40.0, "*_knee": 60.0}
@@ -80,7 +80,7 @@ def test_values_per_joint_may_change_while_a_graph_runs() -> None:
 
 def robot_of(head: str, *overrides: str) -> RobotDescription:
     text = f"rate: 500 Hz\n{head}\nblocks:\n  one: {{use: blocks.Constant, with: {{value: [1]}}}}\n"
-    robot = load_text(text, WRONG / "graph.yaml", overrides).robot
+    robot = checked_text(text, WRONG / "graph.yaml", overrides).robot
     assert robot is not None
     return robot
 
@@ -95,9 +95,9 @@ def test_the_profile_in_use() -> None:
 
 def test_the_profile_is_in_the_flattened_text() -> None:
     text = blocks("one: {use: blocks.Constant, with: {value: [1]}}")
-    graph = load_text(text, WRONG / "graph.yaml", ["actuators=relaxed"])
+    graph = checked_text(text, WRONG / "graph.yaml", ["actuators=relaxed"])
     assert "robot: bruce\nactuators: relaxed\n" in graph.text
-    assert load_text(graph.text, WRONG / "graph.yaml").robot == graph.robot
+    assert checked_text(graph.text, WRONG / "graph.yaml").robot == graph.robot
 
 
 @pytest.mark.parametrize("robot", ["../own/hopper.yaml", "package://own/hopper.yaml"])
@@ -111,10 +111,10 @@ def test_a_robot_of_a_file_is_found_again_from_the_flattened_text(
     (tmp_path / "pieces" / "arm.yaml").write_text(
         blocks("one: {use: blocks.Constant, with: {value: [1]}}", f"robot: {robot}")
     )
-    graph = load_text(
+    graph = checked_text(
         "rate: 500 Hz\ninclude: [../pieces/arm.yaml]\n", tmp_path / "graphs" / "graph.yaml"
     )
-    again = load_text(graph.text, tmp_path / "graphs" / "graph.yaml")
+    again = checked_text(graph.text, tmp_path / "graphs" / "graph.yaml")
     assert again.robot == graph.robot is not None and again.text == graph.text
 
 

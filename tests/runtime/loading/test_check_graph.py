@@ -8,13 +8,13 @@ import pytest
 from aloft.files.problems import Position
 from aloft.runtime.graph import Graph
 from aloft.runtime.language.stages import CheckedGraph, ClockSpec
-from aloft.runtime.loading import LoadError, check, load, load_text
+from aloft.runtime.loading import LoadError, check, checked_file, checked_text
 
 PATH = Path("graph.yaml")
 
 
 def graph_of(blocks: str, head: str = "rate: 100 Hz") -> CheckedGraph:
-    return load_text(f"{head}\nblocks:\n{blocks}", PATH)
+    return checked_text(f"{head}\nblocks:\n{blocks}", PATH)
 
 
 def problems_of(blocks: str, head: str = "rate: 100 Hz") -> list[str]:
@@ -104,14 +104,14 @@ def test_the_fix_for_a_missing_dimension_is_a_key_of_the_graph(tmp_path: Path) -
     assert problem.message == "one (sized:Source) needs the dimension 'm', which nothing gives"
     assert problem.fix == "for the whole graph, beside 'blocks': dimensions: {m: 3}"
     path.write_text(f"{problem.fix.partition(': ')[2]}\n{path.read_text()}")
-    assert load(path).block("one").dimensions["m"] == 3
+    assert checked_file(path).block("one").dimensions["m"] == 3
 
 
 def test_a_robot_from_a_file_beside_the_graph(tmp_path: Path) -> None:
     shipped = Path(__file__).parents[3] / "robots" / "bruce" / "bruce.yaml"
     (tmp_path / "mine.yaml").write_text(shipped.read_text().replace("name: bruce", "name: mine", 1))
     (tmp_path / "graph.yaml").write_text(f"rate: 1\nrobot: mine.yaml\nblocks:\n{CONSTANT}")
-    graph = load(tmp_path / "graph.yaml")
+    graph = checked_file(tmp_path / "graph.yaml")
     assert graph.robot is not None and graph.robot.name == "mine"
 
 
@@ -175,7 +175,7 @@ def test_a_constant_in_place_of_a_source_with_units(tmp_path: Path) -> None:
         "  a: {use: heights:Relay, in: {u: {value: {height: 12 cm}}}}\n"
         "  b: {use: heights:Relay, in: {u: {value: {others: [1 mm, 2]}}}}\n"
     )
-    result = Graph(load(tmp_path / "graph.yaml")).run()
+    result = Graph(checked_file(tmp_path / "graph.yaml")).run()
     assert result.signal("a.y.height")[0] == 0.12
     assert result.signal("a.y.others")[0].tolist() == [0.0, 0.0]
     assert result.signal("b.y.others")[0].tolist() == [0.001, 2.0]
@@ -288,15 +288,15 @@ blocks:
 """
     (tmp_path / "part.yaml").write_text(inner)
     use = "rate: 100 Hz\nblocks:\n  part: {use: part.yaml, rate: 10 Hz, offset: OFFSET}\n"
-    graph = load_text(use.replace("OFFSET", "5"), tmp_path / "graph.yaml")
+    graph = checked_text(use.replace("OFFSET", "5"), tmp_path / "graph.yaml")
     times = {spec.path: (spec.period_ticks, spec.offset_ticks) for spec in graph.blocks}
     assert times == {"part/slow": (10, 5), "part/fast": (2, 1)}
-    again = load_text(graph.text, tmp_path / "again.yaml")
+    again = checked_text(graph.text, tmp_path / "again.yaml")
     assert {s.path: (s.period_ticks, s.offset_ticks) for s in again.blocks} == times
     with pytest.raises(LoadError, match="part/slow runs every 10 ticks"):
-        load_text(use.replace("OFFSET", "10"), tmp_path / "graph.yaml")
+        checked_text(use.replace("OFFSET", "10"), tmp_path / "graph.yaml")
     with pytest.raises(LoadError, match="offset"):
-        load_text(use.replace("OFFSET", "-1"), tmp_path / "graph.yaml")
+        checked_text(use.replace("OFFSET", "-1"), tmp_path / "graph.yaml")
 
 
 def test_an_input_is_not_proposed_the_source_that_another_one_has(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from aloft.files.problems import Problem
 from aloft.runtime.graph import Graph
-from aloft.runtime.loading import LoadError, load_text
+from aloft.runtime.loading import LoadError, checked_text
 
 PARTS = """\
 from aloft import Block, Field, Input, Output, Parameters, Signal, parameter
@@ -49,7 +49,7 @@ def folder(tmp_path: Path) -> Path:
 
 def graph_of(folder: Path, blocks: str) -> Graph:
     head = "rate: 100 Hz\nduration: 0.05 s\nblocks:\n  p: {use: parts:Plant}\n"
-    return Graph(load_text(head + blocks, folder / "graph.yaml"))
+    return Graph(checked_text(head + blocks, folder / "graph.yaml"))
 
 
 def problem_of(folder: Path, blocks: str) -> Problem:
@@ -121,7 +121,7 @@ def test_the_flattened_graph_says_it_as_it_was_meant_and_loads_again(folder: Pat
     first = graph_of(folder, blocks)
     assert 'in: {u: {value: "p.y.position[2]", angle: 30 deg}}' in first.checked.text
     assert 'in: {u: ["p.y.grid[0, 1]", 0]}' in first.checked.text
-    again = Graph(load_text(first.checked.text, folder / "graph.yaml"))
+    again = Graph(checked_text(first.checked.text, folder / "graph.yaml"))
     assert again.checked.text == first.checked.text
     assert again.run().run_hash == first.run().run_hash
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from aloft.runtime.loading.load import check
+from aloft.runtime.loading.checked import check
 
 TWO_SOURCES = """\
 rate: 100 Hz

@@ -8,7 +8,7 @@ import pytest
 
 from aloft.files.nodes import plain
 from aloft.runtime.graph import Graph
-from aloft.runtime.loading import LoadError, flatten, load, load_text
+from aloft.runtime.loading import LoadError, checked_file, checked_text, flatten
 
 LEG = """
 inputs: {u: }
@@ -46,7 +46,7 @@ def write(folder: Path, **files: str) -> Path:
 
 
 def run(path: Path, overrides: Any = ()) -> Any:
-    return Graph(load(path, overrides)).run()
+    return Graph(checked_file(path, overrides)).run()
 
 
 def test_subgraphs_used_many_times_and_nested(tmp_path: Path) -> None:
@@ -66,8 +66,8 @@ def test_subgraphs_used_many_times_and_nested(tmp_path: Path) -> None:
 
 def test_flat_text_loads_to_the_same_graph(tmp_path: Path) -> None:
     path = write(tmp_path, leg=LEG, body=BODY, graph=GRAPH)
-    graph = load(path, {"one.gain": 7.0, "rate": "200 Hz"})
-    again = load_text(graph.text, path)
+    graph = checked_file(path, {"one.gain": 7.0, "rate": "200 Hz"})
+    again = checked_text(graph.text, path)
     assert again.text == graph.text
     assert again.order == graph.order
     assert [b.params for b in again.blocks] == [b.params for b in graph.blocks]
@@ -102,7 +102,7 @@ set: {leg.gain: 4, leg/second.gain: 5}
 
 
 def gain_of(path: Path, overrides: Any = ()) -> float:
-    return load(path, overrides).block("gain").params.gain  # type: ignore[attr-defined,no-any-return]
+    return checked_file(path, overrides).block("gain").params.gain  # type: ignore[attr-defined,no-any-return]
 
 
 def test_precedence_of_overrides(tmp_path: Path) -> None:
@@ -125,7 +125,7 @@ def test_precedence_of_overrides(tmp_path: Path) -> None:
     assert gain_of(path, ["gain.gain=6"]) == 6.0
     assert gain_of(path, ["gain.gain=6", "gain.gain=7"]) == 7.0
     assert gain_of(path, {"gain.gain": np.float64(8.0)}) == 8.0
-    assert load(path, ["gain.gain=6"]).overrides == {"gain.gain": 6}
+    assert checked_file(path, ["gain.gain=6"]).overrides == {"gain.gain": 6}
 
 
 def test_outer_set_wins_over_a_subgraphs_own(tmp_path: Path) -> None:
@@ -138,7 +138,7 @@ blocks:
   leg: {use: leg.yaml, in: {u: source.y}}
 set: {leg/second.gain: 10}
 """
-    loaded = load(write(tmp_path, leg=leg, graph=graph))
+    loaded = checked_file(write(tmp_path, leg=leg, graph=graph))
     gains = [loaded.block(f"leg/{name}").params.gain for name in ("first", "second")]  # type: ignore[attr-defined]
     assert gains == [8.0, 10.0]
 
@@ -148,7 +148,7 @@ def test_another_block_in_its_place(tmp_path: Path) -> None:
     own = "rate: 100 Hz\ninclude: [part.yaml]\nset: {last.use: runtime.Delay}\n"
     path = write(tmp_path, leg=LEG, body=BODY, part=graph, graph=own)
     with pytest.raises(LoadError) as told:
-        load(path, {"one/left/second.use": "runtime.Nothing"})
+        checked_file(path, {"one/left/second.use": "runtime.Nothing"})
     assert "--set one/left/second.use=runtime.Nothing" in str(told.value)
     replaced = flatten(path, ["last.use=leg.yaml", "last.gain=3"]).text
     assert "  last/second:\n    use: blocks.Gain\n" in replaced
@@ -157,7 +157,7 @@ def test_another_block_in_its_place(tmp_path: Path) -> None:
 
 def test_overrides_of_the_graph_itself(tmp_path: Path) -> None:
     path = write(tmp_path, leg=LEG, body=BODY, graph=GRAPH)
-    graph = load(path, ["rate=1 kHz", "duration=2", "clock.kind=paced", "dimensions.m=4"])
+    graph = checked_file(path, ["rate=1 kHz", "duration=2", "clock.kind=paced", "dimensions.m=4"])
     assert (graph.base_rate, graph.ticks, graph.clock.kind) == (1000.0, 2000, "paced")
     assert graph.block("last").dimensions["m"] == 4
 
@@ -190,7 +190,7 @@ def test_an_override_inside_a_nested_parameter(tmp_path: Path) -> None:
         "    def step(self): pass\n"
     )
     graph = "rate: 1 Hz\nblocks: {a: {use: nested:Nested, with: {noise: {bias: 3}}}}"
-    params: Any = load(write(tmp_path, graph=graph), ["a.noise.gyro=5"]).block("a").params
+    params: Any = checked_file(write(tmp_path, graph=graph), ["a.noise.gyro=5"]).block("a").params
     assert (params.noise.gyro, params.noise.bias) == (5.0, 3.0)
 
 
@@ -208,7 +208,7 @@ blocks:
   two: {use: blocks.Constant, with: {value: [2.0]}}
 wires: {gain.u: two.y}
 """
-    loaded = load(write(tmp_path, base=base, graph=graph))
+    loaded = checked_file(write(tmp_path, base=base, graph=graph))
     assert loaded.block("gain").wires["u"].source == "two.y"
     assert loaded.base_rate == 100.0
     assert [block.path for block in loaded.blocks] == ["one", "gain", "two"]
@@ -218,7 +218,7 @@ def test_a_file_included_twice_counts_once(tmp_path: Path) -> None:
     common = "blocks: {one: {use: blocks.Constant, with: {value: [1.0]}}}"
     inner = "include: common.yaml\n"
     graph = "rate: 1 Hz\ninclude: [a.yaml, b.yaml, common.yaml]\n"
-    loaded = load(write(tmp_path, common=common, a=inner, b=inner, graph=graph))
+    loaded = checked_file(write(tmp_path, common=common, a=inner, b=inner, graph=graph))
     assert [block.path for block in loaded.blocks] == ["one"]
 
 
@@ -230,7 +230,9 @@ blocks:
   one: {use: blocks.Constant, with: {value: [1.0, 1.0]}}
   leg: {use: deep/second.yaml, in: {u: one.y}}
 """
-    loaded = load(write(tmp_path, other=other, graph="rate: 1 Hz\ninclude: deep/inner.yaml"))
+    loaded = checked_file(
+        write(tmp_path, other=other, graph="rate: 1 Hz\ninclude: deep/inner.yaml")
+    )
     assert [block.path for block in loaded.blocks] == ["one", "leg/first", "leg/second"]
 
 
@@ -244,7 +246,7 @@ blocks:
   two: {<<: *gain, with: *gains}
   three: {<<: *gain, with: {<<: *gains, gain: 4.0}}
 """
-    loaded = load(write(tmp_path, graph=graph))
+    loaded = checked_file(write(tmp_path, graph=graph))
     gains = [loaded.block(name).params.gain for name in ("two", "three")]  # type: ignore[attr-defined]
     assert gains == [3.0, 4.0]
 
@@ -286,7 +288,7 @@ blocks:
     assert result.signal("free/b.y.value")[-1].tolist() == [5.0, 5.0]
     assert result.signal("full/a.y.value")[-1].tolist() == [9.0, 12.0]
     assert result.signal("full/b.y.value")[-1].tolist() == [1.0, 2.0]
-    assert load(path).block("free/b").wires == {}
+    assert checked_file(path).block("free/b").wires == {}
 
 
 def test_parameters_reach_everything_inside(tmp_path: Path) -> None:
@@ -305,7 +307,7 @@ blocks:
   one: {use: blocks.Constant, with: {value: [1.0]}}
   inner: {use: inner.yaml, with: {weights: 4.5}, in: {u: one.y}}
 """
-    loaded = load(write(tmp_path, inner=inner, graph=graph))
+    loaded = checked_file(write(tmp_path, inner=inner, graph=graph))
     gain, total = loaded.block("inner/gain"), loaded.block("inner/sum")
     assert gain.period_ticks == 2
     assert (gain.wires["u"].delay, gain.wires["u"].initial) == (3, {"value": 2.0})
@@ -326,9 +328,9 @@ def test_dollars_in_texts_survive_the_flat_text(tmp_path: Path) -> None:
         "    def step(self): pass\n"
     )
     path = write(tmp_path, graph="rate: 1 Hz\nblocks: {a: {use: texts:Text, with: {text: $$HOME}}}")
-    graph = load(path)
+    graph = checked_file(path)
     assert graph.block("a").params.text == "$HOME"  # type: ignore[attr-defined]
-    assert load_text(graph.text, path).block("a").params == graph.block("a").params
+    assert checked_text(graph.text, path).block("a").params == graph.block("a").params
 
 
 def test_flatten_raises_what_it_cannot_expand(tmp_path: Path) -> None:
@@ -344,4 +346,4 @@ def test_too_many_blocks_are_refused(tmp_path: Path) -> None:
         files[f"level{i}"] = f"blocks: {{a: {{use: {below}}}, b: {{use: {below}}}}}"
     graph = "rate: 1 Hz\nblocks: {top: {use: level14.yaml}}"
     with pytest.raises(LoadError, match="more than 5000 blocks"):
-        load(write(tmp_path, graph=graph, **files))
+        checked_file(write(tmp_path, graph=graph, **files))

@@ -7,7 +7,7 @@ import pytest
 from aloft.files.problems import Problem
 from aloft.runtime.language.block import Block
 from aloft.runtime.language.registry import all_blocks
-from aloft.runtime.loading import check, load, load_text
+from aloft.runtime.loading import check, checked_file, checked_text
 
 SENSOR = """\
 from aloft import Block, Field, Input, Output, Parameters, Signal, parameter
@@ -130,7 +130,7 @@ def test_a_plain_number_is_no_length_and_the_fix_says_so(tmp_path: Path) -> None
 
 def test_numbers_with_units_are_converted_to_the_first_one() -> None:
     text = "rate: 1\nblocks:\n  c: {use: blocks.Constant, with: {value: [1 m, 20 cm]}}\n"
-    spec = load_text(text, Path("g.yaml")).block("c")
+    spec = checked_text(text, Path("g.yaml")).block("c")
     assert spec.params.value == [1.0, 0.2]  # type: ignore[attr-defined]
     assert str(spec.quantities["y.value"]) == "m"
 
@@ -191,7 +191,7 @@ def test_a_ring_that_nothing_enters_must_not_contradict_itself(tmp_path: Path) -
 def test_what_blocks_make_of_units(tmp_path: Path, blocks: str, unit: str) -> None:
     (tmp_path / "parts.py").write_text(SENSOR)
     text = f"rate: 1\nblocks:\n  s: {{use: parts:Sensor}}\n  {blocks}\n"
-    graph = load_text(text, tmp_path / "graph.yaml")
+    graph = checked_text(text, tmp_path / "graph.yaml")
     assert str(graph.block("y").quantities["y.value"]) == unit
 
 
@@ -223,7 +223,7 @@ def test_a_unit_that_is_not_checked_is_said(tmp_path: Path) -> None:
         "rate: 1\nblocks:\n  s: {use: parts:Sensor}\n  u: {use: parts:Silent, in: {u: s.mm}}\n"
         "  r: {use: parts:Reader, in: {m: u.y, w: s.unsaid}}\n"
     )
-    graph = load_text(text, tmp_path / "graph.yaml")
+    graph = checked_text(text, tmp_path / "graph.yaml")
     assert graph.unchecked == (
         "u.y does not say its unit, and r.m reads value in m",
         "s.unsaid does not say its unit, and r.w reads value in m",
@@ -232,7 +232,7 @@ def test_a_unit_that_is_not_checked_is_said(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["jump", "hops", "robots/go2_jump"])
 def test_shipped_graphs_leave_no_unit_unchecked(name: str) -> None:
-    assert load(f"aloft:{name}").unchecked == ()
+    assert checked_file(f"aloft:{name}").unchecked == ()
 
 
 def test_every_shipped_block_says_what_it_carries() -> None:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from aloft.runtime.loading import load
+from aloft.runtime.loading import checked_file
 
 INNER = """\
 inputs: {u: }
@@ -22,7 +22,7 @@ blocks:
 def test_an_offset_is_wrapped_into_the_period_of_a_faster_inner_block(tmp_path: Path) -> None:
     (tmp_path / "inner.yaml").write_text(INNER)
     (tmp_path / "outer.yaml").write_text(OUTER)
-    graph = load(tmp_path / "outer.yaml")
+    graph = checked_file(tmp_path / "outer.yaml")
     found = {
         spec.path: (spec.period_ticks, spec.offset_ticks)
         for spec in graph.blocks

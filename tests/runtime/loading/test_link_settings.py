@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from aloft.runtime.language.stages import LinkPolicy, LinkSettings
-from aloft.runtime.loading import LoadError, load_text
+from aloft.runtime.loading import LoadError, checked_text
 
 PATH = Path("graph.yaml")
 GRAPH = """
@@ -19,7 +19,7 @@ blocks:
 
 
 def settings(text: str, overrides: tuple[str, ...] = ()) -> LinkSettings:
-    return load_text(GRAPH + text, PATH, overrides).links
+    return checked_text(GRAPH + text, PATH, overrides).links
 
 
 def test_lockstep_is_the_default() -> None:
@@ -35,9 +35,9 @@ def test_policies() -> None:
 
 def test_overrides_and_the_flat_text() -> None:
     overrides = ("links.mode=free", "links.max_age=20 ms", "links.late=safe")
-    graph = load_text(GRAPH, PATH, overrides)
+    graph = checked_text(GRAPH, PATH, overrides)
     assert graph.links == LinkSettings("free", LinkPolicy(0.02, "safe"))
-    assert load_text(graph.text, PATH).links == graph.links
+    assert checked_text(graph.text, PATH).links == graph.links
 
 
 def test_what_is_watched() -> None:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aloft.runtime.loading import LoadError, check, load
+from aloft.runtime.loading import LoadError, check, checked_file
 
 GRAPH = """\
 rate: 100 Hz
@@ -63,7 +63,7 @@ def survives(graph: str, leg: str, more: str, overrides: list[str]) -> None:
     assert report.text()
     assert report.as_json()["count"] == len(report.problems)
     try:
-        loaded = load(path, overrides)
+        loaded = checked_file(path, overrides)
     except LoadError:
         assert not report.ok
     else:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
@@ -10,7 +10,7 @@ from aloft.runtime.language.block import Block, Context, Output, UnmetRequiremen
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.parameters import Parameters, parameter
 from aloft.runtime.language.signals import Field, Signal
-from aloft.runtime.loading import LoadError, load, load_text
+from aloft.runtime.loading import LoadError, checked_file, checked_text
 
 PATH = Path(__file__).parent / "graph.yaml"
 
@@ -27,11 +27,13 @@ class Teller(Block):
         count: int = parameter(2, text="a number")
 
     params: Params
+    asked: ClassVar[dict[str, frozenset[str]]] = {}
     y = Output(Level, text="the height")
 
     @classmethod
     def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:
         assert isinstance(params, cls.Params)
+        cls.asked[context.path] = context.asked
         if params.height == 99.0:
             raise AloftError("99 is too much")
         low = UnmetRequirement("nothing is below the ground", fix="height: 1 m")
@@ -46,7 +48,7 @@ HERE = f"{Path(__file__).stem}:Teller"
 
 def graph(first: str, second: str, more: Mapping[str, Any] | None = None) -> Any:
     text = f"rate: 10 Hz\nblocks:\n  a: {{use: '{HERE}', with: {first}}}\n  b: {{use: '{HERE}', with: {second}}}\n"
-    return load_text(text, PATH, more or {})
+    return checked_text(text, PATH, more or {})
 
 
 def problems(first: str, second: str) -> list[str]:
@@ -120,9 +122,18 @@ def test_a_broken_teller_is_the_only_problem() -> None:
 
 
 def test_a_value_set_inside_a_named_file_changes_what_is_in_it(tmp_path: Path) -> None:
-    checked = load(
+    checked = checked_file(
         "graphs/jump.yaml", ["plan.task=tasks/in_situ.yaml", "plan.task.distance_x=20 cm"]
     )
     task = checked.block("plan").params.model_dump()["task"]
     assert task == {"file": "tasks/in_situ.yaml", "distance_x": "20 cm"}
     assert checked.block("score").params.model_dump()["distance"] == [0.2, 0.0]
+
+
+def test_a_block_is_told_which_of_its_values_are_asked_for() -> None:
+    found = graph("{height: 2.0}", "{height: {from: a.twice}, count: {from: a.count}}")
+    asked = found.block("a").block_type.asked
+    assert asked["a"] == {"twice", "count"}
+    asked.clear()
+    graph("{height: 2.0}", "{height: 3.0}")
+    assert not asked

@@ -5,8 +5,8 @@ import pytest
 from aloft.files.problems import LoadError
 from aloft.runtime.language.registry import find_block
 from aloft.runtime.language.stages import CheckedGraph
+from aloft.runtime.loading.checked import checked_text
 from aloft.runtime.loading.checking.parameters import adjust, entries, plain_parameters
-from aloft.runtime.loading.load import load_text
 from aloft.runtime.running.memory import BoundGraph
 
 TEXT = """
@@ -22,7 +22,7 @@ robot: bruce
 
 @pytest.fixture(scope="module")
 def graph() -> BoundGraph:
-    checked: CheckedGraph = load_text(TEXT, "test.yaml")
+    checked: CheckedGraph = checked_text(TEXT, "test.yaml")
     return BoundGraph(checked)
 
 

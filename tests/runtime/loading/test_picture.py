@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
-from aloft.runtime.drawing.diagram import diagram
+from aloft.extensions.studio.diagram.diagram import diagram
 from aloft.runtime.language.stages import CheckedGraph
-from aloft.runtime.loading import load_text
+from aloft.runtime.loading import checked_text
 from aloft.runtime.loading.picture import mermaid, table, table_json
 
 PARTS = """
@@ -39,7 +39,7 @@ blocks:
 
 def graph(folder: Path) -> CheckedGraph:
     (folder / "picture_parts.py").write_text(PARTS)
-    return load_text(GRAPH, folder / "graph.yaml")
+    return checked_text(GRAPH, folder / "graph.yaml")
 
 
 def test_rows_in_the_order_of_execution(tmp_path: Path) -> None:
@@ -105,7 +105,7 @@ def test_mermaid_draws_a_box_around_a_subgraph(tmp_path: Path) -> None:
         "  gain: {use: blocks.Gain, in: {u: one.y}}\n"
     )
     text = "rate: 1\nblocks: {left: {use: leg.yaml}, sum: {use: blocks.Gain, in: {u: left.y}}}"
-    assert mermaid(load_text(text, tmp_path / "graph.yaml")) == (
+    assert mermaid(checked_text(text, tmp_path / "graph.yaml")) == (
         "flowchart LR\n"
         '  b2["sum<br/>blocks.Gain<br/>1 Hz"]\n'
         '  subgraph left_box ["left"]\n'
@@ -120,7 +120,7 @@ def test_mermaid_draws_a_box_around_a_subgraph(tmp_path: Path) -> None:
 def test_a_block_in_the_background_says_its_latency(tmp_path: Path) -> None:
     text = GRAPH.replace("rate: 50 Hz}", "rate: 50 Hz, background: {latency: 60 ms}}")
     (tmp_path / "picture_parts.py").write_text(PARTS)
-    checked = load_text(text, tmp_path / "graph.yaml")
+    checked = checked_text(text, tmp_path / "graph.yaml")
     rows = {row.path: row for row in table(checked)}
     assert (rows["slow"].background, rows["slow"].machine) == ("60 ms", "Moore")
     assert {row.background for path, row in rows.items() if path != "slow"} == {""}

@@ -97,7 +97,9 @@ def test_every_block_is_described(validator: Draft7Validator) -> None:
     gain = schema["definitions"]["blocks.Gain"]
     assert gain["description"] == "The input times a constant: y = gain u."
     assert gain["properties"]["with"]["properties"]["gain"]["description"] == "the factor"
-    assert gain["properties"]["in"]["properties"]["u"]["description"] == "Vector: what is scaled"
+    assert (
+        gain["properties"]["in"]["properties"]["u"]["description"] == "Vector: the vector to scale"
+    )
     frequency = schema["definitions"]["blocks.SineWave"]["properties"]["with"]["properties"]
     assert frequency["frequency"]["description"] == "oscillations per second [Hz]"
 

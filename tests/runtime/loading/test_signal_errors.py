@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.extensions.studio.diagram.diagram import subgraphs
 from aloft.files.problems import LoadError
 from aloft.logs.replay.replay import KeptRun, Keyframes, replay
-from aloft.runtime.drawing.diagram import subgraphs
 from aloft.runtime.language.signal_error import chirp_lines
 from aloft.runtime.loading.picture import table
 from aloft.runtime.running.run_result import RunResult

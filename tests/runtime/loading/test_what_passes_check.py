@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from aloft.runtime.language.errors import RunError
-from aloft.runtime.loading import LoadError, load
+from aloft.runtime.loading import LoadError, checked_file
 from aloft.runtime.running.memory import BoundGraph
 
 from ...cli.conftest import run_here
@@ -63,7 +63,7 @@ class Broken(Block):
 def outcome(path: Path, overrides: dict[str, Any] | None = None) -> str:
     """Load and set up a graph; anything but the two errors is not caught."""
     try:
-        graph = load(path, overrides or {})
+        graph = checked_file(path, overrides or {})
     except LoadError as error:
         assert error.report.problems
         return "report"
@@ -84,7 +84,7 @@ def names() -> list[str]:
     """All parameters of a shipped graph but one: another task may have to be solved."""
     parameters = [
         f"{spec.path}.{name}"
-        for spec in load(JUMP).blocks
+        for spec in checked_file(JUMP).blocks
         for name in type(spec.params).model_fields
     ]
     return [each for each in parameters if each != "plan.task"]

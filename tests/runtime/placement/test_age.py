@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from aloft.runtime.language.stages import CheckedGraph
-from aloft.runtime.loading import LoadError, load, load_text
+from aloft.runtime.loading import LoadError, checked_file, checked_text
 from aloft.runtime.placement.age import worst_age
 from aloft.runtime.placement.placed import PlacementError
 
@@ -15,7 +15,7 @@ SENSOR = "  sensor: {use: blocks.Constant, with: {value: [1.0]}}\n"
 
 
 def age(blocks: str, target: str, head: str = HEAD) -> float | None:
-    return worst_age(load_text(head + SENSOR + blocks, PATH), "sensor.y", target)
+    return worst_age(checked_text(head + SENSOR + blocks, PATH), "sensor.y", target)
 
 
 def test_in_one_tick_the_value_is_used_for_one_period() -> None:
@@ -73,7 +73,7 @@ def test_what_does_not_depend_on_it_has_no_age() -> None:
 
 
 def test_ends_that_do_not_exist() -> None:
-    graph: CheckedGraph = load_text(
+    graph: CheckedGraph = checked_text(
         HEAD + SENSOR + "  b: {use: blocks.Gain, in: {u: sensor.y}}\n", PATH
     )
     with pytest.raises(PlacementError, match=r"no wired output 'sensor.x'; sensor has y"):
@@ -83,7 +83,7 @@ def test_ends_that_do_not_exist() -> None:
 
 
 def test_the_jump_uses_what_it_has_just_measured() -> None:
-    graph = load(Path(__file__).parents[3] / "graphs" / "jump.yaml")
+    graph = checked_file(Path(__file__).parents[3] / "graphs" / "jump.yaml")
     assert worst_age(graph, "robot.imu", "robot.command") == pytest.approx(0.002)
 
 
@@ -99,13 +99,13 @@ def test_the_jump_uses_what_it_has_just_measured() -> None:
 def test_assertions_are_part_of_the_load_report(path: str, problem: str) -> None:
     text = HEAD + SENSOR + "  b: {use: blocks.Gain, in: {u: sensor.y}}\n"
     with pytest.raises(LoadError) as caught:
-        load_text(f"{text}links: {{paths: {{{path}}}}}\n", PATH)
+        checked_text(f"{text}links: {{paths: {{{path}}}}}\n", PATH)
     (found,) = caught.value.report.problems
     assert f"{found.code}: {found.message}".startswith(problem)
 
 
 def test_an_assertion_that_holds() -> None:
     text = HEAD + SENSOR + "  b: {use: blocks.Gain, in: {u: sensor.y}}\n"
-    graph = load_text(f"{text}links: {{paths: {{sensor.y -> b.u: 10 ms}}}}\n", PATH)
+    graph = checked_text(f"{text}links: {{paths: {{sensor.y -> b.u: 10 ms}}}}\n", PATH)
     assert graph.links.paths == {"sensor.y -> b.u": 0.01}
-    assert load_text(graph.text, PATH).links == graph.links
+    assert checked_text(graph.text, PATH).links == graph.links

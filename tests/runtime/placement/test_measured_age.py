@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aloft.runtime.language.stages import CheckedGraph
-from aloft.runtime.loading import load_text
+from aloft.runtime.loading import checked_text
 from aloft.runtime.placement.age import LinkTimes, Timeline, measured_ages, worst_age
 
 PATH = Path("graph.yaml")
@@ -15,7 +15,7 @@ SENSOR = "  sensor: {use: blocks.Constant, with: {value: [1.0]}}\n"
 
 
 def graph(blocks: str, head: str = "rate: 100 Hz\n") -> CheckedGraph:
-    return load_text(f"{head}blocks:\n{SENSOR}{blocks}", PATH)
+    return checked_text(f"{head}blocks:\n{SENSOR}{blocks}", PATH)
 
 
 def even(n: int, period: int = 10 * MS, start: int = 5000 * MS) -> list[int]:

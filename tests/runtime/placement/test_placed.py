@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from aloft.runtime.language.stages import MachineSpec
-from aloft.runtime.loading import load, load_text
+from aloft.runtime.loading import checked_file, checked_text
 from aloft.runtime.placement.placed import (
     PlacementError,
     link_rows,
@@ -37,7 +37,7 @@ blocks:
 
 
 def machines_of(text: str, path: Path = PATH) -> dict[str, str]:
-    return {spec.path: spec.machine for spec in load_text(text, path).blocks}
+    return {spec.path: spec.machine for spec in checked_text(text, path).blocks}
 
 
 def test_a_block_without_a_place_runs_on_the_first_machine() -> None:
@@ -47,7 +47,7 @@ def test_a_block_without_a_place_runs_on_the_first_machine() -> None:
 
 
 def test_a_graph_without_machines_is_placed_nowhere() -> None:
-    graph = load_text("rate: 1\nblocks:\n  a: {use: blocks.Constant, with: {value: [1]}}", PATH)
+    graph = checked_text("rate: 1\nblocks:\n  a: {use: blocks.Constant, with: {value: [1]}}", PATH)
     assert graph.machines == () and graph.blocks[0].machine == ""
     with pytest.raises(PlacementError, match="names no machines; give it"):
         split_over_machines(graph)
@@ -72,8 +72,8 @@ place: {last: ground, last/second: onboard, left/second: onboard}
 
 
 def test_the_flat_text_says_the_place_of_every_block_and_loads_to_the_same_graph() -> None:
-    graph = load_text(HEAD + BLOCKS + "place: {wish: ground}", PATH)
-    again = load_text(graph.text, PATH)
+    graph = checked_text(HEAD + BLOCKS + "place: {wish: ground}", PATH)
+    again = checked_text(graph.text, PATH)
     assert "on: ground" in graph.text and "place" not in graph.text
     assert [spec.machine for spec in again.blocks] == [spec.machine for spec in graph.blocks]
     assert [(m.name, m.endpoint) for m in again.machines] == [
@@ -83,7 +83,7 @@ def test_the_flat_text_says_the_place_of_every_block_and_loads_to_the_same_graph
 
 def test_overrides_move_blocks_and_endpoints() -> None:
     settings = ["place.error=onboard", "machines.ground=tcp/127.0.0.1:9999"]
-    graph = load_text(HEAD + BLOCKS, PATH, settings)
+    graph = checked_text(HEAD + BLOCKS, PATH, settings)
     assert graph.block("error").machine == "onboard"
     assert [machine.endpoint for machine in graph.machines] == [
         "tcp/127.0.0.1:7450", "tcp/127.0.0.1:9999",
@@ -102,7 +102,7 @@ blocks:
 
 
 def test_links_carry_only_what_is_read_elsewhere() -> None:
-    placed = split_over_machines(load_text(HEAD + BLOCKS, PATH))
+    placed = split_over_machines(checked_text(HEAD + BLOCKS, PATH))
     assert [(link.name, link.rate_hz, link.payload, link.readers) for link in placed.links] == [
         ("wish@onboard -> ground", 50.0, 8, ("error.a",)),
         ("controller@ground -> onboard", 100.0, 8, ("position.u",)),
@@ -116,8 +116,8 @@ def test_links_carry_only_what_is_read_elsewhere() -> None:
 
 def test_a_shipped_controller_is_spread_by_an_overlay() -> None:
     shipped = Path(__file__).parents[3] / "graphs"
-    placed = split_over_machines(load(shipped / "machines" / "jump_two.yaml"))
-    alone = load(shipped / "jump.yaml")
+    placed = split_over_machines(checked_file(shipped / "machines" / "jump_two.yaml"))
+    alone = checked_file(shipped / "jump.yaml")
     assert placed.graph.order == alone.order
     assert [spec.path for spec in placed.graph.blocks] == [spec.path for spec in alone.blocks]
     sent = {link.source: [field.name for field in link.fields] for link in placed.links}
@@ -127,14 +127,14 @@ def test_a_shipped_controller_is_spread_by_an_overlay() -> None:
 
 
 def test_an_unknown_machine() -> None:
-    placed = split_over_machines(load_text(HEAD + BLOCKS, PATH))
+    placed = split_over_machines(checked_text(HEAD + BLOCKS, PATH))
     assert placed.machine("ground").endpoint == "tcp/127.0.0.1:7451"
     with pytest.raises(PlacementError, match="has no machine 'air'; it has onboard, ground"):
         placed.machine("air")
 
 
 def test_spread() -> None:
-    graph = load_text(HEAD + BLOCKS, PATH)
+    graph = checked_text(HEAD + BLOCKS, PATH)
     other = spread(graph, {"a": "tcp/127.0.0.1:1", "b": "tcp/127.0.0.1:2"}, {"error": "b"})
     assert other.machines == (
         MachineSpec("a", "tcp/127.0.0.1:1"),
@@ -146,7 +146,7 @@ def test_spread() -> None:
 
 
 def test_printed() -> None:
-    placed = split_over_machines(load_text(HEAD + BLOCKS, PATH))
+    placed = split_over_machines(checked_text(HEAD + BLOCKS, PATH))
     assert machine_rows(placed) == [
         ("onboard", "tcp/127.0.0.1:7450", "wish, position", "2 links, 1.2 kB/s", "1 link, 0.8 kB/s"),
         ("ground", "tcp/127.0.0.1:7451", "error, controller", "1 link, 0.8 kB/s", "2 links, 1.2 kB/s"),

@@ -16,7 +16,7 @@ from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
 from aloft.runtime.language.block import Block
 from aloft.runtime.language.errors import AloftError
-from aloft.runtime.loading import load_text
+from aloft.runtime.loading import checked_text
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
@@ -38,7 +38,7 @@ class Running:
 
     def __init__(self, text: str = GRAPH, sinks: Any = (), **options: Any) -> None:
         self.control = RunControl(**{"paused": True, **options})
-        self.bound = BoundGraph(load_text(text, "graph.yaml"))
+        self.bound = BoundGraph(checked_text(text, "graph.yaml"))
         self._executor = Executor(self.bound, sinks=[*sinks, self.control], plain=True)
         self._results: list[RunResult] = []
         self._thread = threading.Thread(target=lambda: self._results.append(self._executor.run()))
@@ -88,7 +88,7 @@ def running(
 
 
 def uninterrupted(text: str = GRAPH) -> RunResult:
-    return Executor(load_text(text, "graph.yaml"), plain=True).run()
+    return Executor(checked_text(text, "graph.yaml"), plain=True).run()
 
 
 def test_a_run_that_goes_back_and_changes_nothing_has_the_same_bytes() -> None:
@@ -193,7 +193,7 @@ def test_a_run_that_a_block_ends_waits_and_goes_back() -> None:
 
 def test_without_pauses_the_run_is_what_it_was() -> None:
     control = RunControl()
-    graph = load_text(GRAPH, "graph.yaml")
+    graph = checked_text(GRAPH, "graph.yaml")
     result = Executor(graph, sinks=[control], plain=True).run()
     assert result.run_hash == uninterrupted().run_hash
     with pytest.raises(AloftError, match="the run has ended"):
@@ -235,7 +235,7 @@ class Drives(Block):
 
 def test_runs_that_are_not_paused() -> None:
     def refusal(text: str, kind: str = "free", machine: str = "") -> str:
-        bound = BoundGraph(load_text(text, "graph.yaml"))
+        bound = BoundGraph(checked_text(text, "graph.yaml"))
         bound.clock.kind = kind
         bound.machine = machine
         return refusal_of(bound)
@@ -258,10 +258,10 @@ def test_runs_that_are_not_paused() -> None:
 def test_a_real_robot_keeps_nothing_and_runs_as_before() -> None:
     text = f"rate: 10 Hz\nduration: 1 s\nblocks: {{motors: {{use: {__name__}:Outside}}}}\n"
     control = RunControl()
-    assert Executor(load_text(text, "graph.yaml"), sinks=[control], plain=True).run().ticks == 10
+    assert Executor(checked_text(text, "graph.yaml"), sinks=[control], plain=True).run().ticks == 10
     with pytest.raises(AloftError, match="meets the real world"):
         control.pause()
-    result = Executor(load_text(text, "graph.yaml"), sinks=[RunControl(paused=True)]).run()
+    result = Executor(checked_text(text, "graph.yaml"), sinks=[RunControl(paused=True)]).run()
     assert not result.success and "motors" in result.reason and result.ticks == 0
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aloft.runtime.graph import Graph
-from aloft.runtime.loading import load_text
+from aloft.runtime.loading import checked_text
 from aloft.runtime.running.run_result import ExitCode, RunResult, merge_metrics
 
 
@@ -55,7 +55,7 @@ def test_a_result_as_text_and_plain_data() -> None:
 def test_the_times_and_values_of_a_logged_run() -> None:
     text = "rate: 100 Hz\nduration: 0.25 s\nblocks:\n  r: {use: blocks.Ramp, with: {slope: 2}}\n"
 
-    found = Graph(load_text(text, Path("ramp.yaml"))).run(log=True)
+    found = Graph(checked_text(text, Path("ramp.yaml"))).run(log=True)
     assert found.ticks == 25 and found.duration_s == pytest.approx(0.25)
     np.testing.assert_allclose(found.time, 0.01 * np.arange(25))
     values = found.signal("r.y.value")

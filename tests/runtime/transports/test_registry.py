@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from aloft.runtime.language.stages import MachineSpec
-from aloft.runtime.loading import LoadError, load_text
+from aloft.runtime.loading import LoadError, checked_text
 from aloft.runtime.transports import registry
 from aloft.runtime.transports.registry import (
     EXAMPLE,
@@ -99,11 +99,11 @@ blocks:
   a: {use: blocks.Constant, with: {value: [1]}}
 """
     with pytest.raises(LoadError) as found:
-        load_text(graph, Path("graph.yaml"))
+        checked_text(graph, Path("graph.yaml"))
     text = str(found.value)
     assert "machines 'near' and 'far' use different transports" in text
     assert "tcp/127.0.0.1:7450" in text and "pigeon/127.0.0.1:7451" in text
-    assert load_text(graph.replace("pigeon/", "tls/"), Path("graph.yaml")).machines
+    assert checked_text(graph.replace("pigeon/", "tls/"), Path("graph.yaml")).machines
 
 
 @pytest.mark.parametrize("transport", list(dict.fromkeys(TRANSPORTS.values())))

@@ -1,0 +1,1 @@
+"""Rooms that can be taken away by deleting their folder; the core imports none of them."""

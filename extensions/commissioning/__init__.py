@@ -1,0 +1,1 @@
+"""A robot on a bench: bring-up, calibration, identification, motor drift, reach."""

@@ -1,0 +1,1 @@
+"""Graphs and parts of them as C libraries and FMUs, and compiled libraries as blocks."""

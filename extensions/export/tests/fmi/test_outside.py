@@ -1,0 +1,39 @@
+"""``export.Outside``: outputs that somebody sets, their types, and wrong declarations."""
+
+from typing import Any
+
+import pytest
+
+from aloft.extensions.export.fmi.outside import Outside
+from aloft.runtime.loading import LoadError, checked_text
+from aloft.runtime.testing import BlockBench
+
+
+def test_outputs_hold_what_was_set() -> None:
+    ports = {
+        "y": {"value": {"shape": [2], "unit": "N", "start": [1.0, 2.0]}},
+        "state": {"on": {"dtype": "bool"}, "count": {"dtype": "int64", "start": 7}},
+    }
+    with BlockBench(Outside, {"ports": ports}) as bench:
+        bench.step()
+        assert bench.get("y").value.tolist() == [1.0, 2.0]
+        assert (bool(bench.get("state").on), int(bench.get("state").count)) == (False, 7)
+        bench.set("kept_y", value=[3.0, 4.0])
+        bench.set("kept_state", on=True)
+        bench.step()
+        assert bench.get("y").value.tolist() == [3.0, 4.0]
+        assert bool(bench.get("state").on)
+
+
+@pytest.mark.parametrize(
+    ("field", "message"),
+    [
+        ({"unit": "furlong"}, "unknown symbol 'furlong'"),
+        ({"dtype": "float16"}, "the dtype of y.value is not one of"),
+        ({"size": 3}, "y.value has no 'size'"),
+    ],
+)
+def test_wrong_fields_are_reported(field: dict[str, Any], message: str) -> None:
+    text = f"rate: 100 Hz\nblocks:\n  a: {{use: export.Outside, with: {{ports: {{y: {{value: {field}}}}}}}}}\n"
+    with pytest.raises(LoadError, match=message):
+        checked_text(text, "graph.yaml")

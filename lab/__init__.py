@@ -1,0 +1,1 @@
+"""Benchmarks, figures and pages of the project itself; in a checkout only."""
