@@ -12,6 +12,7 @@ import linecache
 import math
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -28,15 +29,23 @@ from aloft.mathematics.compiling.translate import Translator
 from aloft.mathematics.kernel import expand, kernel, kernels
 from aloft.robots.description import find_robot
 from aloft.runtime.language import steps
+from aloft.runtime.language.extensions import own_extensions
 from aloft.runtime.language.registry import find_block, known_names
 from aloft.runtime.testing.bench import BlockBench
 from aloft.runtime.testing.conformance import random_inputs, unmet_messages
 
+from . import kernel_samples
 from .hal.sensors.mounting import bruce_with
-from .kernel_samples import UNUSED
 
 ROOT = Path(__file__).parent.parent
-ROOMS = ("mathematics", "blocks", "hal")
+ROOMS = (
+    "mathematics",
+    "blocks",
+    "hal",
+    "extensions/hopping/blocks",
+    "extensions/commissioning/blocks",
+    "extensions/export/blocks",
+)
 HOT = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool", *vars(arrays)} - {"Any"}
 NOT_HOT = {
@@ -67,13 +76,7 @@ NOT_HOT = {
     "mathematics.whole_body_solution.active_set_program": "memory, when a block is set up",
     "mathematics.quadratic_program.cone_rows": "of the program that Clarabel gets",
     "mathematics.whole_body_cones.cone_memory": "memory, when a block is set up",
-    "hal.bear.bring_up.imu_step._millimetres": "of a bring-up, with nothing under power",
-    "hal.bear.bring_up.imu_step._angle_between": "of a bring-up, with nothing under power",
     "hal.bear.configuration.imu_rotation_of": "when a file of the hardware is written",
-    "hal.bear.bring_up.imu_step._straightness": "of a bring-up, with nothing under power",
-    "hal.bear.bring_up.standing_steps.hop": "makes a step of a bring-up",
-    "hal.bear.bring_up.imu_step._words": "of a bring-up, with nothing under power",
-    "hal.bear.bring_up.steps._closest_motor": "of a bring-up, with nothing under power",
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.platform": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.check_slope": "checks a scene, when a graph is loaded",
@@ -101,6 +104,16 @@ SENSORS = {
 
 PYTHON = {bool, int, float}
 """Other numbers, such as those of an enumeration, are made plain ones."""
+
+UNUSED = kernel_samples.UNUSED | {
+    name: arguments
+    for each in own_extensions().values()
+    if (each.folder / "tests" / "kernel_samples.py").is_file()
+    for name, arguments in import_module(
+        f"extensions.{each.name}.tests.kernel_samples"
+    ).SAMPLES.items()
+}
+"""Arguments of the kernels that a jump does not call, those of extensions, too."""
 
 
 def copy(arguments):
