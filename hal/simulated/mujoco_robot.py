@@ -232,14 +232,14 @@ class MujocoRobot(SimulatedRobot):
             thrusters = SimulatedThrusters(
                 robot, plant.model, plant.data, self.drives, self.thrust_queue
             )
-            following.append(thrusters.following())
+            following.append(thrusters.follow_call())
         self._reading = CallSequence([
-            *plant.reading(self.imu, self.joints),
-            *plant.reading_switches(self.contacts.closed),
-            *plant.sensors.reading_mounted(self.mounted()),
-            *plant.truth.reporting(self.truth), self.reporting(),
-            *plant.reporting_drives(self.health),
-            *([thrusters.reading(self.thrusters)] if thrusters else []),
+            *plant.reading_calls(self.imu, self.joints),
+            *plant.switch_calls(self.contacts.closed),
+            *plant.sensors.mounted_calls(self.mounted()),
+            *plant.truth.report_calls(self.truth), self.report_call(),
+            *plant.health_calls(self.health),
+            *([thrusters.read_call(self.thrusters)] if thrusters else []),
         ])  # fmt: skip
         latency = self._latency = CommandLatency(
             np.zeros(1), float(params.jitter), np.zeros(1), params.timestep
@@ -247,12 +247,12 @@ class MujocoRobot(SimulatedRobot):
         jitter, _ = uniform_call(plant.streams[Purpose.JITTER], latency.draw)
         self._sending = CallSequence([
             *([jitter] if params.jitter else []),
-            drives.sending(self.command, self.physics.step, latency),
-            *([thrusters.sending(self.thrust)] if thrusters else []),
+            drives.send_call(self.command, self.physics.step, latency),
+            *([thrusters.send_call(self.thrust)] if thrusters else []),
         ])  # fmt: skip
-        self._settling = plant.simulating(drives, 1, thrusters=following)
-        self._ticking = plant.simulating(drives, steps, self.push, following)
-        self._damped = plant.simulating(drives, steps, thrusters=following)
+        self._settling = plant.simulation(drives, 1, thrusters=following)
+        self._ticking = plant.simulation(drives, steps, self.push, following)
+        self._damped = plant.simulation(drives, steps, thrusters=following)
 
     @property
     def calls(self) -> Mapping[str, Sequence[Call]]:
@@ -260,7 +260,7 @@ class MujocoRobot(SimulatedRobot):
         next tick."""
         return {
             "read": self._reading.calls, "send": self._sending.calls,
-            "clear": (self.plant.clearing,), "advance": self._ticking.calls,
+            "clear": (self.plant.clear_call,), "advance": self._ticking.calls,
         }  # fmt: skip
 
     def open(self) -> None:
