@@ -72,6 +72,8 @@ SOURCES = {
     "a/one.py": """
 from ..b.two import Told
 
+import pytest
+
 class Memory(Signal):
     speed = Field("m/s")
     place = Field("m")
