@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -71,8 +73,6 @@ def test_the_same_seed_draws_the_same_changes() -> None:
 SOURCES = {
     "a/one.py": """
 from ..b.two import Told
-
-import pytest
 
 class Memory(Signal):
     speed = Field("m/s")
