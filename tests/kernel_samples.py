@@ -32,8 +32,8 @@ from aloft.robots.five_joint_leg import read_leg
 from aloft.robots.kinematics import body_tree
 from aloft.robots.limb import read_limb
 from aloft.robots.limb_inverse import limb_scratch
+from aloft.robots.terrain import Ground, HeightField, Terrain
 from aloft.runtime.language.steps import as_record
-from aloft.runtime.language.terrain import Ground, HeightField, Terrain
 
 from .robots.limbed_robots import quadruped
 

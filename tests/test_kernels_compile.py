@@ -249,7 +249,7 @@ def calls():
         other = {"estimator.use": "blocks.InvariantKalmanFilter", "legs.beyond": "slide"}
         run_jump({**other, "wbc.solver": "daqp"}, duration=0.1)
         other = {"estimator.use": "blocks.ComplementaryFilter", "estimator.flight": "ballistic"}
-        other["robot.bus_period"] = None  # drives that give every joint its own feedback
+        other["robot.actuators.bus_period"] = None  # drives that give every joint its own feedback
         other |= {"safety.tilt_limit": 1e-6, "safety.tilt_hold": 0.0}  # it is damped
         run_jump({**other, "joint_pd.stance_targets": "acceleration"}, duration=0.02)
         weak = {"wbc.torque_margin": 0.15, "wbc.friction": 0.05}  # constraints come and go
@@ -263,7 +263,7 @@ def calls():
         mounted = {"imu_position": [0.01, 0.0, 0.02], "imu_rotation": [0.0, 0.01, 0.02]}
         run_alone("blocks.SensorAlignment", find_robot("bruce"), play=0.01, **mounted)
         gears = {"stiffness": 500.0, "damping": 0.5, "backlash": 0.001}
-        run_alone("hal.MujocoRobot", find_robot("bruce"), gears=gears)
+        run_alone("hal.MujocoRobot", find_robot("bruce"), actuators={"gears": gears})
         for name in known_names():  # blocks that none of these graphs has
             own = [name_of[id(f)] for f in find_block(name).named_steps.values() if is_kernel(f)]
             if not all(samples[each] for each in own):
