@@ -134,7 +134,8 @@ def execute(
 ) -> Replayed:
     """Replay, with a progress bar. Raises ``AloftError``."""
     from ..logs.replay.replay import replay as replay_run
-    from .shared.output import TickCounter, progress_bar
+    from .shared.output import progress_bar
+    from .shared.run_graph import TickCounter
 
     if first is not None and until is not None and until <= first:
         raise AloftError(

@@ -22,7 +22,8 @@ from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.stages import BlockSpec, CheckedGraph, ClockSpec, Wire
 from ...runtime.running.memory import BoundGraph
 from ...runtime.running.pacing import WallTime
-from ...runtime.running.sinks import MemoryLog, RunHash, Sink
+from ...runtime.running.sink import Sink
+from ...runtime.running.sinks import MemoryLog, RunHash
 from ...runtime.running.ticker import Ticker
 from ...runtime.testing.allocations import count_array_allocations
 from .rows import Row, compare, take_turns

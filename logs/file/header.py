@@ -9,11 +9,11 @@ from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from ...robots.terrain import Terrain, WorldParameters
 from ...runtime.language.layout import Layout
 from ...runtime.language.quantities import Quantity
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.stages import BlockSpec, CheckedGraph
-from ...runtime.language.terrain import SupportsScene, Terrain
 from ...runtime.running.memory import BoundGraph
 from .dependencies import contents, digests, files_read, parameter_files, project_state
 from .format import Header, RecordedBlock, RecordedField, RecordedLayout
@@ -86,7 +86,7 @@ def make_header(
 
 def terrain_of(graph: CheckedGraph) -> Terrain | None:
     """Return the ground of the first block that has a world."""
-    scenes = (spec.params for spec in graph.blocks if isinstance(spec.params, SupportsScene))
+    scenes = (spec.params for spec in graph.blocks if isinstance(spec.params, WorldParameters))
     return next((params.build_scene(graph.robot) for params in scenes), None)
 
 

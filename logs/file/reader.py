@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from ...runtime.language.layout import only_field
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import Snapshot
-from ...runtime.running.sinks import Note
+from ...runtime.running.sink import Note
 from .format import (
     BUS,
     FORMAT,

@@ -22,7 +22,7 @@ from ...runtime.links.part import MergedLayout
 from ...runtime.links.path_ages import MAX_TICKS, check_path_ages, timeline_of
 from ...runtime.placement.placed import PlacedGraph
 from ...runtime.running.memory import BoundGraph, Memory, Snapshot
-from ...runtime.running.sinks import Note
+from ...runtime.running.sink import Note
 from ..file.header import header_of
 from ..file.reader import RecordedRun, read
 from .writer import RecordingWriter

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.run_result import RunResult
-from ...runtime.running.sinks import Note, parameter_note
+from ...runtime.running.sink import Note, parameter_note
 from ..file.format import BUS, KEYFRAMES, PACKED, ROWS, STATE, Header, spans, time_columns
 from ..file.header import make_header
 from ..file.index import Index

@@ -31,7 +31,7 @@ from ...runtime.running.executor import Executor
 from ...runtime.running.memory import BoundGraph, Snapshot
 from ...runtime.running.playback import Playback, PlaybackBlock, playback_graph
 from ...runtime.running.run_result import RunResult
-from ...runtime.running.sinks import Note, Sink
+from ...runtime.running.sink import Note, Sink
 
 
 class Replayable(Protocol):
@@ -113,7 +113,7 @@ class KeptRun:
         return self.snapshots[tick]
 
 
-class Keyframes:
+class Keyframes(Sink):
     """A sink that takes a snapshot before every tick that ``every`` divides, except the first."""
 
     def __init__(self, every: int) -> None:
@@ -132,9 +132,6 @@ class Keyframes:
         if (tick + 1) % self.every == 0:
             taken = self._bound.snapshot()
             self.snapshots[tick + 1] = Snapshot(tick + 1, taken.bus, taken.state)
-
-    def close(self) -> None:
-        """Do nothing."""
 
 
 def late_blocks(notes: Iterable[Note]) -> tuple[str, ...]:
@@ -347,7 +344,7 @@ def _expect_no_gap(recorded: Replayable, fed: Sequence[str], start: int, end: in
         )
 
 
-class Follower:
+class Follower(Sink):
     """A sink that feeds the blocks that do not run, applies recorded changes of parameters, and compares."""
 
     def __init__(
@@ -393,9 +390,6 @@ class Follower:
                     f"what the keyframe at tick {tick} holds does not fit this graph: state "
                     f"{note}; replay from the beginning"
                 )
-
-    def open(self, bound: BoundGraph) -> None:
-        """No-op: the blocks have not started yet."""
 
     def ready(self) -> None:
         """Restore the keyframe it begins with, and prepare the first tick."""

@@ -42,7 +42,7 @@ def classes_in(path: Path) -> tuple[WrittenClass, ...]:
 
 
 def blocks_in_packages(packages: Mapping[str, Path]) -> Mapping[str, Path]:
-    """The blocks that graphs can use as ``package.Class``, with their files, sorted by name.
+    """Find the blocks that graphs can use as ``package.Class``, with their files, sorted by name.
 
     A class is a block if it derives from ``Block`` or ``KernelBlock``, also through other classes.
     It can be used if it has or inherits a port and one of the methods ``step`` and ``emit``, it is

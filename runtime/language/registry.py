@@ -45,7 +45,7 @@ def snake_case(name: str) -> str:
 
 @lru_cache(maxsize=1)
 def _own_blocks() -> Mapping[str, Path]:
-    """The blocks of aloft and their files, found by parsing the files without importing them."""
+    """Find the blocks of aloft and their files, by parsing the files without importing them."""
     return blocks_in_packages(
         {name: _ROOT / name for name in PACKAGES}
         | {each.name: each.folder for each in extensions() if each.name != "lab"}
@@ -134,8 +134,8 @@ def _places(folder: Path | None) -> tuple[Path, ...]:
 
 @cache
 def _own_module(package: str, class_name: str) -> ModuleType | None:
-    """The module of a package of the core, or of an extension, that has the class: first the one that
-    convention gives, then any."""
+    """Import the module of a package of the core, or of an extension, that has the class: first the
+    one that convention gives, then any."""
     if package in PACKAGES:
         folder, imported = _ROOT / package, f"{_OURS}.{package}"
     elif (found := extension(package)) is not None:

@@ -25,6 +25,7 @@ from ..language.layout import Layout
 from ..language.stages import CheckedGraph
 from ..running.memory import BoundGraph, nameless_memory
 from ..running.run_result import RunResult
+from ..running.sink import Sink
 from ..running.ticker import Ticker
 from ..running.timing import STAMPED_TICKS
 
@@ -85,7 +86,7 @@ class WindowLayout:
         return self.stamps(last)[1] if last >= 0 else self.bus_start + -(-self.bus // 8) * 8
 
 
-class Window:
+class Window(Sink):
     """The side of the running graph; a sink for the executor."""
 
     def __init__(self) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from difflib import get_close_matches
 from html import escape
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -207,19 +207,3 @@ def merge_metrics(
             if name not in ("success", "reason"):
                 merged[name if len(owners[name]) == 1 else f"{path}.{name}"] = value
     return merged, failure, success_reason
-
-
-@runtime_checkable
-class SupportsResult(Protocol):
-    """The method that a sink has, beside ``record``, if it wants the result of the run."""
-
-    def finish(self, result: RunResult) -> list[str]:
-        """Take the result, after everything else is closed. Returns warnings for the user."""
-
-
-@runtime_checkable
-class SupportsAbandoned(Protocol):
-    """The method that a sink has, beside ``record``, if it wants to know of a run that is abandoned."""
-
-    def abandoned(self, result: RunResult) -> None:
-        """Take the result of a run that hangs; when all sinks have it, the process ends."""

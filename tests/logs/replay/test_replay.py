@@ -27,6 +27,7 @@ from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.running.sink import Sink
 from aloft.runtime.testing import BlockUse, checked_graph
 
 
@@ -110,7 +111,7 @@ def graph(kind: type[Gain] = Gain, robot: type[Noise] = Noise, factor: float = 3
     )
 
 
-class Change:
+class Change(Sink):
     """A sink that changes parameters while the graph runs."""
 
     def __init__(self, changes: Mapping[int, Mapping[str, Any]]) -> None:
@@ -122,9 +123,6 @@ class Change:
     def record(self, tick: int) -> None:
         if tick + 1 in self.changes:
             self.bound.parameters.requests.append(adjust(self.bound.blocks, self.changes[tick + 1]))
-
-    def close(self) -> None:
-        pass
 
 
 def record(checked: CheckedGraph, changes: Mapping[int, Mapping[str, Any]] = {}) -> KeptRun:
