@@ -57,7 +57,7 @@ class NumberCode(CodeLines):
         return Value(kind, (self.result(text),), counts=flag, bits=1 if flag else 63)
 
     def exact(self, value: Value) -> Value:
-        """A whole number that a float has room for; a larger one ends the run, where Python would go
+        """Check that a float has room for a whole number; a larger one ends the run, where Python would go
         on with the whole number."""
         if value.kind == "int" and value.bits > _MANTISSA and value.constant is None:
             moved = self.result(f"add i64 {value.parts[0]}, {2**_MANTISSA}")

@@ -295,12 +295,12 @@ def _counts_up(loop: ast.expr, names: set[str]) -> bool:
 
 
 def plus(a: ast.expr, b: ast.expr) -> ast.expr:
-    """``a + b``."""
+    """Write ``a + b``."""
     return _sum(a, ast.Add(), b, 1)
 
 
 def minus(a: ast.expr, b: ast.expr) -> ast.expr:
-    """``a - b``."""
+    """Write ``a - b``."""
     return _sum(a, ast.Sub(), b, -1)
 
 
@@ -316,5 +316,5 @@ def _sum(a: ast.expr, op: ast.operator, b: ast.expr, sign: int) -> ast.expr:
 
 
 def called(name: str, *arguments: ast.expr) -> ast.Call:
-    """``name(arguments...)``."""
+    """Write ``name(arguments...)``."""
     return ast.Call(ast.Name(name, ast.Load()), list(arguments), [])
