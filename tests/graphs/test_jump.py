@@ -110,3 +110,10 @@ def test_every_solver_jumps_and_finds_the_optimum_in_every_tick(solver):
     assert result.success, result.reason
     assert result.metrics["qp_failures"] == 0
     assert result.metrics["apex_above_standing_m"] == pytest.approx(0.1187, abs=2e-4)
+
+
+def test_the_papers_controller_lands():
+    """Its order of priorities, torso before angular momentum, and all of its other choices."""
+    result = aloft.load(GRAPHS / "paper_jump.yaml", {"robot.seed": 1}).run(log=False)
+    assert result.metrics["final_tilt_deg"] < 5.0, result.reason
+    assert result.metrics["apex_above_standing_m"] > 0.1
