@@ -311,7 +311,7 @@ class MujocoRobot(SimulatedRobot):
         return {"physics.integration": integration_elements(self.plant.model)}
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The values that were drawn from the seed, and what the drives do not give of the gains."""
+        """Return the values that were drawn from the seed, and what the drives do not give of the gains."""
         found = self.plant.metrics()
         if self.params.actuators.bus_period is None:
             return found

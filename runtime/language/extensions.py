@@ -166,7 +166,6 @@ def missing_extension(name: str, what: str) -> str:
     """Return the sentence that names the extension of a missing thing."""
     if name == "lab":
         return f"{what} is part of the lab, which is not in the wheel; {FROM_SOURCE}"
-    return f"{what} is part of the lab, which only a checkout of the repository has, not a wheel"
     return (
         f"{what} is part of the extension {name!r}, which is not here: its folder extensions/{name} is missing; "
         "install aloft-robotics again to have it back"
