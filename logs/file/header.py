@@ -9,11 +9,11 @@ from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from ...robots.terrain import Terrain, WorldParameters
 from ...runtime.language.layout import Layout
 from ...runtime.language.quantities import Quantity
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.stages import BlockSpec, CheckedGraph
-from ...runtime.language.terrain import Terrain, WorldParameters
 from ...runtime.running.memory import BoundGraph
 from .dependencies import contents, digests, files_read, parameter_files, project_state
 from .format import Header, RecordedBlock, RecordedField, RecordedLayout
