@@ -1,4 +1,4 @@
-"""What an effect adds to the physics steps of a simulated robot.
+"""Effects: additions to the physics steps of a simulated robot.
 
 ``Plant`` has its effects in one list, and each step makes the calls of a hook in the order of that list::
 
@@ -27,7 +27,7 @@ from .drives import MotorLimits
 
 
 class StepViews(NamedTuple):
-    """What effects read and write in a physics step, in arrays that keep their place.
+    """Values that effects read and write in a physics step, in arrays that keep their place.
 
     Attributes:
         base: the base in the simulator.

@@ -16,7 +16,8 @@ from ...runtime.language.parameters import Parameters
 from ...runtime.language.signals import StateElements
 from ..drive_control import gain_requirements, lost_gains
 from .motor_feedback import FeedbackState, MotorFeedback
-from .simulated_robot import SimulatedRobot, SimulatorParameters, impossible_effects
+from .parameters import SimulatorParameters
+from .simulated_robot import SimulatedRobot, impossible_effects
 from .state import DriveState, TickRecord, integration_elements
 from .thrusters import SimulatedThrusters, ThrustQueue
 from .unsupported import uneven_contacts, unsupported_motor
@@ -232,14 +233,14 @@ class MujocoRobot(SimulatedRobot):
             thrusters = SimulatedThrusters(
                 robot, plant.model, plant.data, self.drives, self.thrust_queue
             )
-            following.append(thrusters.following())
+            following.append(thrusters.follow_call())
         self._reading = CallSequence([
-            *plant.reading(self.imu, self.joints),
-            *plant.reading_switches(self.contacts.closed),
-            *plant.sensors.reading_mounted(self.mounted()),
-            *plant.truth.reporting(self.truth), self.reporting(),
-            *plant.reporting_drives(self.health),
-            *([thrusters.reading(self.thrusters)] if thrusters else []),
+            *plant.reading_calls(self.imu, self.joints),
+            *plant.switch_calls(self.contacts.closed),
+            *plant.sensors.mounted_calls(self.mounted()),
+            *plant.truth.report_calls(self.truth), self.report_call(),
+            *plant.health_calls(self.health),
+            *([thrusters.read_call(self.thrusters)] if thrusters else []),
         ])  # fmt: skip
         latency = self._latency = CommandLatency(
             np.zeros(1), float(params.jitter), np.zeros(1), params.timestep
@@ -247,12 +248,12 @@ class MujocoRobot(SimulatedRobot):
         jitter, _ = uniform_call(plant.streams[Purpose.JITTER], latency.draw)
         self._sending = CallSequence([
             *([jitter] if params.jitter else []),
-            drives.sending(self.command, self.physics.step, latency),
-            *([thrusters.sending(self.thrust)] if thrusters else []),
+            drives.send_call(self.command, self.physics.step, latency),
+            *([thrusters.send_call(self.thrust)] if thrusters else []),
         ])  # fmt: skip
-        self._settling = plant.simulating(drives, 1, thrusters=following)
-        self._ticking = plant.simulating(drives, steps, self.push, following)
-        self._damped = plant.simulating(drives, steps, thrusters=following)
+        self._settling = plant.simulation(drives, 1, thrusters=following)
+        self._ticking = plant.simulation(drives, steps, self.push, following)
+        self._damped = plant.simulation(drives, steps, thrusters=following)
 
     @property
     def calls(self) -> Mapping[str, Sequence[Call]]:
@@ -260,7 +261,7 @@ class MujocoRobot(SimulatedRobot):
         next tick."""
         return {
             "read": self._reading.calls, "send": self._sending.calls,
-            "clear": (self.plant.clearing,), "advance": self._ticking.calls,
+            "clear": (self.plant.clear_call,), "advance": self._ticking.calls,
         }  # fmt: skip
 
     def open(self) -> None:
@@ -310,7 +311,7 @@ class MujocoRobot(SimulatedRobot):
         return {"physics.integration": integration_elements(self.plant.model)}
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The values that were drawn from the seed, and what the drives do not give of the gains."""
+        """Return the values that were drawn from the seed, and what the drives do not give of the gains."""
         found = self.plant.metrics()
         if self.params.actuators.bus_period is None:
             return found

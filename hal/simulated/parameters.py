@@ -40,7 +40,7 @@ def _check_range(name: str, value: Sequence[float] | None) -> None:
 
 
 class StartParameters(Parameters):
-    """How a run begins; by default the robot stands level, in phase with the control clock."""
+    """Start of a run; by default the robot stands level, in phase with the control clock."""
 
     initial_attitude_error: float = parameter(
         0.0, unit="rad", ge=0, le=0.1,
@@ -109,12 +109,12 @@ class GroundParameters(Parameters):
         return self
 
     def build(self, robot: RobotDescription | None, seed: int) -> Terrain:
-        """The terrain for a robot, with tiles drawn by the ``seed``."""
+        """Return the terrain for a robot, with tiles drawn by the ``seed``."""
         scene = self._scene_of_the_task(seed)
         return scene if self.uneven is None else self.uneven.cover(scene, robot, seed)
 
     def _scene_of_the_task(self, seed: int) -> Terrain:
-        """The ground without tiles that nobody is told of."""
+        """Return the ground without its hidden tiles."""
         if isinstance(self.scene, scenes.SceneParameters):
             return self.scene.build(seed)
         if self.scene == "step":
@@ -127,7 +127,7 @@ class GroundParameters(Parameters):
 
 
 class BodyParameters(Parameters):
-    """How the bodies differ from the description, and what pulls at them; by default nothing."""
+    """Differences of the bodies from the description, and forces on them; by default nothing."""
 
     mass_scale: float = parameter(1.0, gt=0, text="factor on all masses and inertias")
     mass_spread: float = parameter(0.0, ge=0, lt=1, text="spread of the factor mass_scale")
@@ -258,5 +258,5 @@ class SimulatorParameters(DriveGains, WorldParameters):
         return self.seed if self.noise_seed is None else self.noise_seed
 
     def build_scene(self, robot: RobotDescription | None) -> Terrain:
-        """The ground these parameters describe, for a robot."""
+        """Return the ground that these parameters describe, for a robot."""
         return self.ground.build(robot, self.seed)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def step_calls(model: MjModel, data: MjData) -> tuple[ForeignCall, ForeignCall]:
-    """The two parts of a physics step: what follows from the state, and the step with the present controls. ``model``
+    """Return the two parts of a physics step: what follows from the state, and the step with the present controls. ``model``
     and ``data`` must stay alive.
 
     Machine code and Python call the same two functions, so the bytes are the same. An error that is fatal to the

@@ -25,7 +25,7 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
 from ...runtime.language.steps import signal_call
-from ..drive_control import correcting
+from ..drive_control import correction_calls
 from ..random_streams import Purpose, RandomStreams, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
@@ -111,7 +111,7 @@ class Plant:
         stiffness, damping: the gains [N m/rad, N m s/rad] (n_joints,) that hold the standing pose.
         position, velocity: the true joint motion [rad, rad/s], views of the simulator's memory.
         effects: what is not ideal, in the order in which a physics step has it.
-        clearing: begins a new record, except for the memory of the switches.
+        clear_call: begins a new record, except for the memory of the switches.
         forces: what acts on the robot from outside.
         step1, step2: the two parts of a physics step, see ``step_calls``.
         late: delay [s] of the physics steps after the control clock's ticks.
@@ -144,7 +144,7 @@ class Plant:
         self._passive = passive_joints(robot)
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
         self._encoder = np.zeros(len(robot.joints))
-        self.clearing = signal_call(clear, record)
+        self.clear_call = signal_call(clear, record)
         self.start_delay = 0.0
         self._attach(mujoco.MjData(self.model))
 
@@ -297,7 +297,7 @@ class Plant:
                 self.velocity[self._passive] = 0.0
                 self.step1.run()
 
-    def simulating(
+    def simulation(
         self, drives: JointTorques, steps: int, push: ExternalForce | None = None,
         thrusters: Sequence[Call] = (),
     ) -> CallSequence:  # fmt: skip
@@ -318,12 +318,12 @@ class Plant:
             *([self.forces.release_call()] if added else []),
             *([] if push is None else [self.forces.push_call(push)]),
             *added,
-            self.step2, *self._motion_calls, self._record_call, *self.sensors.after_step(),
+            self.step2, *self._motion_calls, self._record_call, *self.sensors.after_step_calls(),
             *self._model_calls, self.step1, *self._reading_calls,
         ]  # fmt: skip
         return CallSequence([self.forces.release_call(), *(one * steps)])
 
-    def reading(self, imu: ImuReading, joints: JointState) -> list[Call]:
+    def reading_calls(self, imu: ImuReading, joints: JointState) -> list[Call]:
         """Write a sample of the IMU, the gyroscope of this instant and the mean of the accelerometer
         since ``clearing``, and one of the joints with their mean torques."""
         record, sensors = self.record, self.sensors
@@ -331,27 +331,27 @@ class Plant:
         return [
             KernelCall(mean_over_steps, record.accelerometer, record.steps, force),
             KernelCall(mean_over_steps, record.joint_torque, record.steps, torque),
-            *correcting(self._params, self._robot, self.sensed[1], torque),
-            *self.reading_imu(force, imu),
-            *sensors.reading_joints(*self.sensed, torque, joints),
+            *correction_calls(self._params, self._robot, self.sensed[1], torque),
+            *self.imu_calls(force, imu),
+            *sensors.joint_calls(*self.sensed, torque, joints),
         ]
 
-    def reading_imu(self, force: Array, imu: ImuReading) -> list[Call]:
+    def imu_calls(self, force: Array, imu: ImuReading) -> list[Call]:
         """Write a sample of the IMU: the gyroscope of this instant, and this specific ``force``
         [m/s^2, body] as the accelerometer's."""
         base = self._base
         return [
-            *base.refresh_calls(), *self.sensors.reading_imu(self._views.rate, force, imu)
+            *base.refresh_calls(), *self.sensors.imu_calls(self._views.rate, force, imu)
         ]  # fmt: skip
 
-    def reading_switches(self, closed: Flags) -> list[Call]:
+    def switch_calls(self, closed: Flags) -> list[Call]:
         """Write a sample of the switches, (n_contacts,)."""
         pressed = self._views.closed
-        return self.sensors.reading_switches(self.physics.step, self.record, pressed, closed)
+        return self.sensors.switch_calls(self.physics.step, self.record, pressed, closed)
 
     def clear_record(self) -> None:
         """Begin a new record, except for the memory of the switches."""
-        self.clearing.run()
+        self.clear_call.run()
 
     def save(self) -> None:
         """Copy the state of the simulator and of the random streams to ``physics``."""
@@ -374,7 +374,7 @@ class Plant:
         for call in (*self._model_calls, self.step1, *restored):
             call.run()
 
-    def reporting_drives(self, health: RobotHealth) -> list[Call]:
+    def health_calls(self, health: RobotHealth) -> list[Call]:
         """Write the pack's voltage and the windings' temperatures to all drives, where they are simulated."""
         return [call for effect in self.effects for call in effect.health_calls(health)]
 

@@ -104,7 +104,7 @@ class SimulatedSensor:
             errors = FieldErrors(noise, sensor.sizes[name], bias, streams.of_field(sensor.name, k))
             self._errors.append((part, errors))
         self._past = samples.reshape(-1, size), count, delay
-        self.after_step: list[Call] = [
+        self.after_step_calls: list[Call] = [
             *sensor.from_mujoco(model, data, true_values),
             KernelCall(accumulate, now, self._averaged, total, steps),
         ]
@@ -118,7 +118,7 @@ class SimulatedSensor:
         """Begin a new sample."""
         self._steps[0] = 0
 
-    def reading(self, out: Signal) -> list[Call]:
+    def reading_calls(self, out: Signal) -> list[Call]:
         """Write a sample, and begin the next one."""
         calls: list[Call] = [
             KernelCall(take_sample, self._averaged, self._total, self._steps, self._true)
@@ -228,21 +228,21 @@ class SimulatedSensors:
             start, first = start + size, first + slots * size
         self.mounted = tuple(found)
 
-    def reading_imu(self, rate: Array, force: Array, out: ImuReading) -> list[Call]:
+    def imu_calls(self, rate: Array, force: Array, out: ImuReading) -> list[Call]:
         """Write a sample of the IMU from the true values [rad/s, m/s^2, body]; zero without IMU."""
         if not self._has_imu:
             return [KernelCall(read_nothing, out.angular_velocity, out.specific_force)]
         true = {"angular_velocity": rate, "specific_force": force}
-        return self._imu.reading(true, self._imu_errors, out)
+        return self._imu.reading_calls(true, self._imu_errors, out)
 
-    def reading_joints(
+    def joint_calls(
         self, position: Array, velocity: Array, torque: Array, out: JointState
     ) -> list[Call]:
         """Write a sample of encoders and currents from the joints' true motion and torques."""
         true = {"position": position, "velocity": velocity, "torque": torque}
-        return self._joints.reading(true, self._joint_errors, out)
+        return self._joints.reading_calls(true, self._joint_errors, out)
 
-    def reading_switches(
+    def switch_calls(
         self, step: Counts, record: TickRecord, pressed: Flags, closed: Flags
     ) -> list[Call]:
         """Write a sample of the switches that are ``pressed``, (n_contacts,); without switches none is
@@ -252,13 +252,15 @@ class SimulatedSensors:
             self._streams[Purpose.BOUNCE], closed,
         )  # fmt: skip
 
-    def reading_mounted(self, outputs: Mapping[str, Any]) -> list[Call]:
+    def mounted_calls(self, outputs: Mapping[str, Any]) -> list[Call]:
         """Write a sample of every mounted sensor to the signal that has its name."""
-        return [call for each in self.mounted for call in each.reading(outputs[each.sensor.name])]
+        return [
+            call for each in self.mounted for call in each.reading_calls(outputs[each.sensor.name])
+        ]
 
-    def after_step(self) -> list[Call]:
+    def after_step_calls(self) -> list[Call]:
         """Return the calls of the mounted sensors after every physics step."""
-        return [call for each in self.mounted for call in each.after_step]
+        return [call for each in self.mounted for call in each.after_step_calls]
 
 
 def _slots(sensor: MountedSensor, params: SimulatorParameters) -> int:

@@ -1,4 +1,4 @@
-"""What all simulated robots have: their ports, and a check of their parameters."""
+"""Base of all simulated robots: their ports, and a check of their parameters."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _unknown_windings(
 def _longest_steps(
     params: SimulatorParameters, robot: RobotDescription
 ) -> Iterator[tuple[str, float]]:
-    """What moves in the drives, and the longest steps [s] that follow it."""
+    """Return the moving parts of the drives, and the longest steps [s] that resolve them."""
     joints, motors, rated = params.actuators.joints, params.actuators.motors, robot.motors
     rotors = joints.rotor_inertia * (1.0 - joints.rotor_inertia_spread) * rated.rotor_inertia
     if params.actuators.gears is not None:

@@ -127,9 +127,9 @@ class TruthReport:
         )
         self._record = record
 
-    def reporting(self, truth: RobotTruth) -> tuple[KernelCall, KernelCall]:
+    def report_calls(self, truth: RobotTruth) -> tuple[KernelCall, KernelCall]:
         """Write all fields of the truth."""
         return (
-            self._base.publishing(truth),
+            self._base.publish_call(truth),
             signal_call(report_truth, self._instant, self._record, truth),
         )

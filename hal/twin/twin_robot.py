@@ -196,7 +196,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
             tuple(params.faults), getattr(self, "sensor_memory", None),
         )  # fmt: skip
         self.twin.set_push(self.push)
-        self._reporting = self.twin.plant.truth.reporting(self.truth)
+        self._reporting = self.twin.plant.truth.report_calls(self.truth)
         self._hardware = hardware
         self.driver = _driver(robot, params, hardware, self.twin)
         self._queue = CommandQueue(self.driver.loop, robot, params.latency, self.period)

@@ -58,12 +58,12 @@ def plant_of(robot: RobotDescription, **params: object) -> Plant:
 def test_stands_with_any_drives_and_counts_its_steps() -> None:
     plant = plant_of(ROBOT, timestep=0.001)
     drives = HoldingDrives(plant)
-    step = plant.simulating(drives, 1)
+    step = plant.simulation(drives, 1)
     plant.stand(step, drives.hold)
     assert plant.physics.step == 0
     assert drives.steps[-2:] == [-2, -1]
     plant.clear_record()
-    plant.simulating(drives, 50).run()
+    plant.simulation(drives, 50).run()
     assert plant.physics.step == 50 and plant.record.steps == 50
     assert float(-plant.record.load[:, 3].sum()) / 50 == pytest.approx(
         ROBOT.total_mass * 9.81, rel=0.01
@@ -74,17 +74,17 @@ def test_stands_with_any_drives_and_counts_its_steps() -> None:
 def test_loaded_it_goes_on_bit_for_bit() -> None:
     plant = plant_of(ROBOT, seed=3, timestep=0.001, gyro_noise=0.02, joint_velocity_noise=0.05)
     drives = HoldingDrives(plant)
-    step = plant.simulating(drives, 1)
+    step = plant.simulation(drives, 1)
     plant.stand(step, drives.hold)
-    plant.simulating(drives, 10).run()
+    plant.simulation(drives, 10).run()
     plant.save()
     kept = {name: view.copy() for name, view in plant.physics}
-    plant.simulating(drives, 30).run()
+    plant.simulation(drives, 30).run()
     first = plant.data.qpos.copy(), plant.streams[Purpose.GYRO].random()
     for name, view in plant.physics:
         view[...] = kept[name]
     plant.load()
-    plant.simulating(drives, 30).run()
+    plant.simulation(drives, 30).run()
     np.testing.assert_array_equal(plant.data.qpos, first[0])
     assert plant.streams[Purpose.GYRO].random() == first[1]
 

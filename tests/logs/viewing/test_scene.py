@@ -75,6 +75,7 @@ def test_all_of_the_jump_is_found() -> None:
 
 def test_every_role_is_a_signal_of_the_vocabulary() -> None:
     from aloft.blocks import signals
+    from aloft.extensions.hopping import signals as hopping
     from aloft.runtime.language.signals import Signal
 
     for role in ROLES:
@@ -82,6 +83,13 @@ def test_every_role_is_a_signal_of_the_vocabulary() -> None:
         assert {name.partition(":")[0] for name in role.fields} <= set(fields)
         assert not set(role.lacks) & set(fields)
     types = {n for n in signals.__all__ if issubclass(getattr(signals, n), Signal)}
+    types |= {
+        n
+        for n, kind in vars(hopping).items()
+        if isinstance(kind, type)
+        and kind.__module__ == hopping.__name__
+        and issubclass(kind, Signal)
+    } - {"PlanRows"}
     assert types == {role.signal for role in ROLES} | set(OTHERS)
 
 
