@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...files.names import inside
 from ...processes.child_process import ChildProcess
 from ...runtime.language.errors import AloftError, ExitCode, RunError
 from ...runtime.language.stages import CheckedGraph
@@ -80,7 +81,9 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
     placed = split_over_machines(checked_file(path, options.settings))
     graph = placed.graph
     with tempfile.TemporaryDirectory(prefix="aloft-parts-") as folder:
-        files = {machine.name: Path(folder) / f"{machine.name}.rrd" for machine in placed.machines}
+        files = {
+            machine.name: inside(Path(folder), f"{machine.name}.rrd") for machine in placed.machines
+        }
         part_reports = _run_processes(path, options, placed, files)
         parts = read_parts(placed, files) if all(f.exists() for f in files.values()) else {}
         run_hash, ticks = run_hash_of(placed, parts) if parts else ("", 0)

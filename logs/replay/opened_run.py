@@ -21,6 +21,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from ...files.names import inside
 from ...files.nodes import plain
 from ...robots.description import RobotDescription, RobotError, find_robot
 from ...runtime.language.errors import AloftError, ExitCode
@@ -65,17 +66,22 @@ def restored(header: Header, graph: FlatGraph, folder: Path) -> Restored:
     """
     overrides: dict[str, str] = {}
     said, entries = [], set()
-    for entry, block, parameter, kind, name in _entries(header):
-        content = unpacked(header.contents[header.files[entry]])
+    places: dict[tuple[str, str], Path] = {}
+    for number, (entry, block, parameter, kind, name) in enumerate(_entries(header)):
+        try:
+            content = unpacked(header.contents[header.files[entry]])
+        except ValueError as error:
+            raise AloftError(f"the recording's file of {entry} cannot be used: {error}") from error
         found_in_folder = kind == "/"
         now = named_file(name, graph.folder)
         if now is not None and sha256(now.read_bytes()).hexdigest() == header.files[entry]:
             continue
-        place = folder / f"{block}.{parameter}"
-        _write(place / Path(name).name, content)
-        overrides[f"{block}.{parameter}"] = str(
-            place if found_in_folder else place / Path(name).name
-        )
+        place = folder / f"file{number}"
+        if found_in_folder:  # further files that the block found lie beside it
+            place = places.setdefault((block, parameter), place)
+        file = inside(place, Path(name).name)
+        _write(file, content)
+        overrides[f"{block}.{parameter}"] = str(place if found_in_folder else file)
         entries.add(entry)
         if found_in_folder:
             said.append(f"the file {name} of {block} is taken from the recording")
@@ -84,7 +90,7 @@ def restored(header: Header, graph: FlatGraph, folder: Path) -> Restored:
         said.append(f"the file of {entry} {why}; the recorded one is used")
     robot = header.robot
     if robot is not None and graph.robot is not None and not _is_present(robot, graph):
-        place = folder / f"{robot.name}.yaml"
+        place = folder / "robot.yaml"
         _write(place, yaml.safe_dump(robot.content(), sort_keys=False).encode())
         overrides["robot"] = str(place)
         said.append(
