@@ -84,13 +84,13 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "fmi": ("robots", "runtime/language"),
     "fmi/exporting": ("fmi", "clib", "robots", "runtime", "logs/file"),
     "clib": ("mathematics/compiling", "logs/file", "runtime"),
-    "logs/file": ("robots", "runtime/language", "runtime/running"),
+    "logs/file": ("files", "robots", "runtime/language", "runtime/running"),
     "logs/viewing": ("files", "logs/file", "hal/sensors", "mathematics", "robots", "runtime/language"),
     "logs/recording": (
         "processes", "logs/file", "logs/viewing", "mathematics", "robots", "runtime/language", "runtime/running",
         "runtime/placement", "runtime/links",
     ),
-    "logs/replay": ("files", "logs/file", "logs/viewing", "robots", "runtime"),
+    "logs/replay": ("files", "blocks/signals", "logs/file", "logs/viewing", "robots", "runtime"),
     "logs/exporting": (
         "logs/file", "hal/sensors", "logs/viewing", "mathematics", "robots", "ros2",
         "runtime/language",

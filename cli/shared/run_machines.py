@@ -28,7 +28,6 @@ from ...runtime.links.path_ages import NAME
 from ...runtime.live.part_feed import PartFeed
 from ...runtime.loading import checked_file
 from ...runtime.placement.placed import PlacedGraph, split_over_machines
-from ...runtime.running.memory import BoundGraph
 from ...runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
 from ...runtime.running.run_result import RunResult, merge_metrics
 from ...runtime.running.sink import Sink
@@ -99,9 +98,7 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
             )
             try:
                 if parts:
-                    recording = merge_recordings(
-                        target, placed, BoundGraph(graph), parts, result.to_json()
-                    )
+                    recording = merge_recordings(target, placed, parts, result.to_json())
             except OSError as error:
                 why = error.strerror or error
                 problem = f"no whole recording: {target} cannot be written ({why})"

@@ -136,13 +136,18 @@ class RecordedLayout:
 
 @dataclass(frozen=True)
 class RecordedBlock:
-    """One block: its type as ``module:Class``, when it runs and the folder of its graph file."""
+    """One block: its type as ``module:Class``, when it runs and the folder of its graph file.
+
+    ``ports`` are those of a block that needs code which is not aloft's, as plain data, so that the graph can
+    be drawn without it; see ``header``.
+    """
 
     path: str
     type: str
     period_ticks: int
     offset_ticks: int
     folder: str
+    ports: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
