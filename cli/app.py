@@ -45,8 +45,8 @@ ONLY_READ = ("check", "graph", "blocks")
 """The verbs that leave nothing to be closed at the end of the process."""
 
 
-def make_app(verbs: Iterable[str] = VERBS) -> typer.Typer:
-    """Make the command line with those verbs; the files of others are not imported.
+def make_app(verbs: Iterable[str] | None = None) -> typer.Typer:
+    """Make the command line with those verbs, or with all; the files of others are not imported.
 
     Raises:
         ExtensionError: an extension's declaration is wrong.
@@ -59,7 +59,7 @@ def make_app(verbs: Iterable[str] = VERBS) -> typer.Typer:
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
     )
-    for verb in verbs:
+    for verb in all_verbs() if verbs is None else verbs:
         offered = _of_the_core(verb) if verb in VERBS else _of_extensions(verb)
         if isinstance(offered, typer.Typer):
             app.add_typer(offered)
@@ -118,7 +118,7 @@ def _why_unknown(arguments: list[str]) -> str:
     from ..runtime.language.extensions import SHIPPED, missing_extension, own_extensions
 
     for name, verbs in SHIPPED.items():
-        for verb in verbs:
+        for verb in all_verbs() if verbs is None else verbs:
             if name not in own_extensions() and verb.split() == arguments[: len(verb.split())]:
                 return missing_extension(name, f"'aloft {verb}'")
     return ""

@@ -422,7 +422,7 @@ def gears_of(
     )  # fmt: skip
 
 
-def correcting(
+def correction_calls(
     params: DriveGains, robot: RobotDescription, velocity: Array, torque: Array
 ) -> list[KernelCall]:
     """Return the call that corrects measured joint torques; none where all motors are nominal."""

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from ..hal.simulated.mujoco_model import body_name, mujoco_spec
 from ..mathematics.arrays import Array
 from ..robots.surfaces import normals, robot_surfaces
+from ..robots.terrain import Terrain
 from ..runtime.language.errors import AloftError
-from ..runtime.language.terrain import Terrain
 
 if TYPE_CHECKING:
     from ..robots.description import RobotDescription

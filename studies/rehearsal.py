@@ -8,7 +8,7 @@ run again with the same seeds. What does not make the deviation smaller is not k
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,7 +18,7 @@ import numpy as np
 
 from ..blocks.jumping.plan_progress import speed_error
 from ..files.nodes import text_of
-from ..hal.simulated.simulated_robot import SimulatorParameters
+from ..hal.simulated.parameters import SimulatorParameters
 from ..mathematics.arrays import Array
 from ..mathematics.constants import GRAVITY
 from ..planner.library.library import shipped_folder
@@ -46,12 +46,23 @@ def trial_settings(trial: str, option: str = "--trial") -> dict[str, Any]:
         raise AloftError(f"{option} {trial}: there is {', '.join(files)}")
     defaults = SimulatorParameters().model_dump(mode="json", round_trip=True)
     found = {
-        f"{block}.{name}": defaults[name]
+        key: value
         for file in files.values()
-        for block, name in (key.split(".")[:2] for key in settings_of(file))
+        for key, value in (_default(key, defaults) for key in settings_of(file))
     }
-    # a group of parameters goes back as a whole, before what is set within it
+    # a group that may be left out goes back as a whole, before what is set within it
     return found | settings_of(files[trial])
+
+
+def _default(key: str, defaults: Mapping[str, Any]) -> tuple[str, Any]:
+    """Return the key of a trial's setting, or of the group around it that is left out by default, and the default."""
+    block, *names = key.split(".")
+    value: Any = defaults
+    for depth, name in enumerate(names, 1):
+        value = value[name]
+        if not isinstance(value, dict):
+            return ".".join([block, *names[:depth]]), value
+    return key, value
 
 
 Found = TypeVar("Found")

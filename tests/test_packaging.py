@@ -20,7 +20,7 @@ from aloft.mathematics.compiling.machine_code import process_triple
 
 ROOT = Path(__file__).parent.parent
 NOT_SHIPPED = {
-    "benchmarks", "tests", "docs", "scripts", "lab", "recordings", "build", "dist", "aloft_robotics.egg-info",
+    "tests", "docs", "scripts", "lab", "recordings", "build", "dist", "aloft_robotics.egg-info",
 }  # fmt: skip
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 LISTED = PROJECT["tool"]["setuptools"]["packages"]
@@ -73,7 +73,9 @@ def test_without_the_source_bench_says_how_to_get_the_benchmarks(
         text=True,
     )
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("error: the benchmarks are not in the wheel; install aloft from")
+    assert done.stderr.startswith(
+        "error: 'aloft bench' is part of the lab, which is not in the wheel; install aloft from"
+    )
     for command in (
         f"pip download --no-deps --no-binary :all: aloft-robotics=={aloft.__version__}",
         f"tar xzf aloft_robotics-{aloft.__version__}.tar.gz",
@@ -140,7 +142,7 @@ def test_the_source_distribution_has_what_the_benchmarks_need(
     assert source_distribution.name == f"aloft_robotics-{aloft.__version__}.tar.gz"
     with tarfile.open(source_distribution) as tar:
         inside = {name.partition("/")[2] for name in tar.getnames()}
-    expected = {path.relative_to(ROOT).as_posix() for path in (ROOT / "benchmarks").rglob("*.py")}
+    expected = {path.relative_to(ROOT).as_posix() for path in (ROOT / "lab").rglob("*.py")}
     for name in zipfile.ZipFile(wheel).namelist():
         if name.startswith("aloft/"):
             expected.add(name.partition("/")[2])

@@ -56,6 +56,7 @@ def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
     """List the parameters, as ``block.parameter=``, of the graph on the command line that begin
     with a text."""
     from ...runtime.language.importing import without_imports
+    from ...runtime.language.parameters import declared_fields
     from ...runtime.loading import LoadError, checked_file
 
     # Arguments in front of an option that still waits for its value are not parsed yet.
@@ -68,7 +69,7 @@ def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
     names = [
         f"{spec.path}.{name}="
         for spec in graph.blocks
-        for name in type(spec.params).model_fields
+        for name, _ in declared_fields(type(spec.params))
         if "~" not in spec.path  # those that loading has inserted cannot be set
     ]
     return [name for name in names if name.startswith(incomplete)]

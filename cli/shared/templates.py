@@ -173,7 +173,7 @@ robot: {name}.xml
 blocks:
   robot:
     use: hal.MujocoRobot
-    with: {{scene: none}}
+    with: {{ground: {{scene: none}}}}
     in:
       command: {{{command}}}
 """

@@ -111,7 +111,7 @@ class Sensor(ABC):
         }
         """Number of elements of each field."""
 
-    def reading(
+    def reading_calls(
         self, true: Mapping[str, Array], errors: Mapping[str, FieldErrors], out: Signal
     ) -> list[Call]:
         """Return the calls that write a sample to ``out``: the ``true`` value of every field, (n,), with its

@@ -20,8 +20,8 @@ from ...mathematics.elementary import acos
 from ...mathematics.linear_algebra import product
 from ...robots.description import Hull, RobotDescription
 from ...robots.kinematics import ball_feet, joints_above, standing_com, standing_heights
+from ...robots.terrain import Vector
 from ...runtime.language.errors import BlockError
-from ...runtime.language.terrain import Vector
 from .base import BASES, FixedBase
 from .unsupported import uneven_contacts
 

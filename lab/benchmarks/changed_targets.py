@@ -141,7 +141,7 @@ def run_changed(kind: str, seed: int, more: Mapping[str, Any] | None = None) -> 
     commands = KINDS[kind](rng)
     sets: dict[str, Any] = {"commands.commands": commands, "score.jumps": 1, "duration": 6.0}
     if kind == "height":
-        sets["robot.scene"] = two_levels(commands[-1]["ahead"], commands[-1]["up"])
+        sets["robot.ground.scene"] = two_levels(commands[-1]["ahead"], commands[-1]["up"])
     return run_seed(seed, "steer.yaml", (SENSOR,), {**sets, **(more or {})})
 
 

@@ -46,9 +46,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...robots.robot_description import RobotDescription
+from ...robots.terrain import Ground, HeightField, Terrain
 from ...runtime.language.layout import Layout
 from ...runtime.language.signals import Slot
-from ...runtime.language.terrain import Ground, HeightField, Terrain
 
 MOST_OF_BUFFER = 1 << 30
 """Bytes of a bus or a state, at most."""

@@ -10,12 +10,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from ...robots.terrain import Terrain, WorldParameters
 from ...runtime.language.block import Block, Port
 from ...runtime.language.layout import Layout
 from ...runtime.language.quantities import Quantity
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.stages import BlockSpec, CheckedGraph
-from ...runtime.language.terrain import Terrain, WorldParameters
 from ...runtime.running.memory import BoundGraph
 from .code import needs_code
 from .dependencies import contents, digests, files_read, parameter_files, project_state

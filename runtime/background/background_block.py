@@ -143,6 +143,7 @@ class BackgroundBlock(WorkerBlock):
         jobs = getattr(self, JOBS)
         self._sampled, self._marks = jobs.sampled.data, jobs.marks.data
         jobs.sampled[:] = jobs.marks[:] = -1
+        self._blank = [np.array(each) for each in self._outputs]
         for port, values in self._background.initial.items():
             for name, value in values.items():
                 getattr(self, port).views()[name][...] = value
@@ -188,7 +189,7 @@ class BackgroundBlock(WorkerBlock):
             self._sampling.append(copies(targets, [*self._inputs, *self._inputs]))
         rows = [memory.results(slot, results) for slot in range(self._slots + 1)]
         self._showing = [copies(results, row) for row in rows[:-1]]
-        self._zeroing = copies(self._outputs, [np.zeros_like(each) for each in self._outputs])
+        self._zeroing = copies(self._outputs, self._blank)
         self._handing_over = copies(rows[-1], results)
         if self._restored:
             self.load_state()

@@ -21,6 +21,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from ... import __version__
 from .errors import AloftError
 
 DECLARATION = "extension.toml"
@@ -52,6 +53,12 @@ SERVICES: Mapping[str, str] = {
     "study_paper": "lab",
 }
 """Services that the core requests from extensions, each with the extension of aloft that has it."""
+
+FROM_SOURCE = f"""install aloft from its source instead:
+    pip download --no-deps --no-binary :all: aloft-robotics=={__version__}
+    tar xzf aloft_robotics-{__version__}.tar.gz
+    pip install --editable aloft_robotics-{__version__}
+or, in a clone of the repository: pip install --editable ."""
 
 _PACKAGE = __name__.rpartition(".runtime.")[0]
 _ROOT = Path(__file__).parents[2]
@@ -158,9 +165,7 @@ def extensions() -> Iterator[Extension]:
 def missing_extension(name: str, what: str) -> str:
     """Return the sentence that names the extension of a missing thing."""
     if name == "lab":
-        return (
-            f"{what} is part of the lab, which only a checkout of the repository has, not a wheel"
-        )
+        return f"{what} is part of the lab, which is not in the wheel; {FROM_SOURCE}"
     return (
         f"{what} is part of the extension {name!r}, which is not here: its folder extensions/{name} is missing; "
         "install aloft-robotics again to have it back"

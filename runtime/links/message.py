@@ -119,6 +119,8 @@ class MessageReader:
         self._schema = schema_of(link)
         self._length = HEADER + link.payload
         self._size = link.payload
+        self.initial = self._payload()
+        """The payload that the bus has before the first message."""
         self.run = bytes(8)
         """Run that messages must belong to; set by the handshake."""
 
@@ -141,6 +143,12 @@ class MessageReader:
         if run != self.run:
             raise DamagedMessageError(f"it is of run {run.hex()}, expected {self.run.hex()}")
         return Message(sequence, tick, time, view[HEADER:])
+
+    def _payload(self) -> memoryview:
+        found = bytearray(self._size)
+        for source, first, last in self._spans:
+            found[first:last] = source
+        return memoryview(bytes(found))
 
     def write_outputs(self, payload: memoryview) -> None:
         """Write a payload into the bus."""

@@ -25,6 +25,7 @@ from ....files.validation import unit_of
 from ....mathematics.arrays import Array
 from ....plotting import COLOURS, FAINT, image, new_figure, style, svg_text
 from ....runtime.language.errors import AloftError
+from ....runtime.language.parameters import given_values
 from ....studies.execution import Run
 from ....studies.expansion import Cell, load_cell
 from ....studies.tuning import Make, draw_runs
@@ -136,8 +137,8 @@ def numeric_parameters(
     for spec in graph.blocks:
         if "~" in spec.path:
             continue
-        for name, info in type(spec.params).model_fields.items():
-            value, key = getattr(spec.params, name), f"{spec.path}.{name}"
+        for name, value, info in given_values(spec.params):
+            key = f"{spec.path}.{name}"
             asked = any(fnmatchcase(key, pattern) for pattern in chosen)
             if not asked or not isinstance(value, float):
                 continue

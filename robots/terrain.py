@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...mathematics.ground_surface import NOWHERE, Surface, height_of_ground
+from ..mathematics.ground_surface import NOWHERE, Surface, height_of_ground
 
 if TYPE_CHECKING:
-    from ...robots.description import RobotDescription
+    from .description import RobotDescription
 
 Vector = tuple[float, float, float]
 Grid = tuple[tuple[float, ...], ...]
