@@ -42,7 +42,7 @@ def reach(
     from ....robots.description import path_of, read
     from ....runtime.graph import load
     from ....studies.batch.seeds import parse_seeds
-    from ....studies.rehearsal import trial_settings
+    from ....studies.trials import trial_settings
     from ..reach.charts import save_reach_chart
     from ..reach.reach import SEEDS, bruce_reach
     from ..reach.reach import reach as find_reach
