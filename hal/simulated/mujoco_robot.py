@@ -16,7 +16,8 @@ from ...runtime.language.parameters import Parameters
 from ...runtime.language.signals import StateElements
 from ..drive_control import gain_requirements, lost_gains
 from .motor_feedback import FeedbackState, MotorFeedback
-from .simulated_robot import SimulatedRobot, SimulatorParameters, impossible_effects
+from .parameters import SimulatorParameters
+from .simulated_robot import SimulatedRobot, impossible_effects
 from .state import DriveState, TickRecord, integration_elements
 from .thrusters import SimulatedThrusters, ThrustQueue
 from .unsupported import uneven_contacts, unsupported_motor
