@@ -157,6 +157,7 @@ class ArrayEquations(Slices):
             )
             return ast.copy_location(ast.BinOp(a, ast.Mult(), b), node)
         if isinstance(node, ast.Call):
+            self._complete(node)
             node.args = [self._element(each, places) for each in node.args]
             return node
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
@@ -166,6 +167,10 @@ class ArrayEquations(Slices):
             )
             return self._power(node)
         return self._children(node, lambda each: self._element(each, places))
+
+    def _complete(self, node: ast.Call) -> None:
+        """Put the arguments of a call of a kernel in their order, with those that are left out."""
+        raise NotImplementedError
 
     def _power(self, node: ast.BinOp) -> ast.expr:
         """``x ** 2`` is ``x * x``, as NumPy computes it: C's ``pow`` may round it otherwise."""

@@ -199,7 +199,7 @@ class ArrayFunctions(ArrayEquations):
         if kind.shape == (0,) and "max" in name + "min":
             raise self._error(node, f"{ast.unparse(node)} of an array without elements")
         before, within = _TEXTS["sum" if name == "mean" else name]
-        value = self._settle(copy.deepcopy(value), "")
+        value = self._settle(self._without_cross(copy.deepcopy(value)), "")
         sizes = [self._size_of(value, k) for k in range(kind.rank)]
         if any(size is None for size in sizes):
             raise self._error(node, f"the size of {ast.unparse(value)} is not known")
@@ -236,6 +236,18 @@ class ArrayFunctions(ArrayEquations):
             assert isinstance(total, ast.Name)
             self._kinds[total.id] = NUMBER
         return total
+
+    def _without_cross(self, value: ast.expr) -> ast.expr:
+        """Compute the cross products in a value ahead, where no equation does."""
+        rewriter = self
+
+        class Products(ast.NodeTransformer):
+            def visit_Call(self, node: ast.Call) -> ast.AST:
+                self.generic_visit(node)
+                return rewriter._new_array(node) if rewriter._is_cross(node) else node
+
+        made: ast.expr = Products().visit(value)
+        return made
 
     # Arrays of the kernel's own
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from .array_functions import ArrayFunctions
-from .kernel_registry import arguments_of
+from .kernel_registry import arguments_of, is_kernel
 from .kinds import NUMBER, ArrayKind, Kind
 from .slices import called, plus
 
@@ -47,14 +47,12 @@ class ArrayLoops(ArrayFunctions):
         counters: list[tuple[ast.expr, ast.expr | None]] = []
 
         def split(target: ast.expr, source: ast.expr) -> bool:
-            if isinstance(source, ast.Call) and not source.keywords:
+            if isinstance(source, ast.Call) and {each.arg for each in source.keywords} <= {
+                "strict"
+            }:
                 function = self._resolved(source.func)
                 targets = target.elts if isinstance(target, ast.Tuple) else []
-                if (
-                    function is enumerate
-                    and len(targets) == 2
-                    and 1 <= len(source.args) <= 2
-                ):
+                if function is enumerate and len(targets) == 2 and 1 <= len(source.args) <= 2:
                     counters.append((targets[0], source.args[1] if source.args[1:] else None))
                     return split(targets[1], source.args[0])
                 if function is zip and len(targets) == len(source.args):
@@ -154,6 +152,12 @@ class ArrayLoops(ArrayFunctions):
         whole = ast.Tuple([ast.Slice() for _ in kind.shape], ast.Load())
         written = ast.copy_location(ast.Subscript(target.value, whole, ast.Store()), node)
         return self._loops(node, written, value, copy.deepcopy(mask))
+
+    def _complete(self, node: ast.Call) -> None:
+        """Put the arguments of a call of a kernel in their order, with those that are left out."""
+        function = self._resolved(node.func)
+        if is_kernel(function):
+            node.args, node.keywords = self._by_position(node, function), []
 
     def _by_position(self, node: ast.Call, function: Any) -> list[ast.expr]:
         """Return the arguments of a call of a kernel in their order, with those that are left out."""

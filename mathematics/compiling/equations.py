@@ -280,9 +280,12 @@ class _Rewriter(ArrayLoops):
         """Note that a name stands for an array, or a part of one."""
         self._aliases.pop(name, None)
         self._partial.discard(name)
-        if not self._is_array(value) or not isinstance(
-            value, ast.Name | ast.Attribute | ast.Subscript
-        ):
+        self._own_of_loops.discard(name)
+        if not self._is_array(value):
+            return
+        if not isinstance(value, ast.Name | ast.Attribute | ast.Subscript):
+            if self._depth and not self._chooses(value):
+                self._own_of_loops.add(name)
             return
         if isinstance(value, ast.Name) and value.id in self._own_of_loops:
             text = f"{name} would keep an array that the loop makes anew; make both before the loop"
@@ -363,6 +366,8 @@ class _Rewriter(ArrayLoops):
             return self._read(node, element)
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult):
             if isinstance(self._kind(node), NumberKind):
+                node = self._without_cross(node)
+                assert isinstance(node, ast.BinOp)
                 return self._sum(node, [])
             raise self._error(node, "a product with @ is an array: assign it, as in out[:] = R @ v")
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
