@@ -81,13 +81,13 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "blocks/jumping": ("blocks/signals", "mathematics", "robots", "runtime/language", "planner"),
     "blocks/scoring": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "hal": ("processes", "files", "blocks/signals", "mathematics", "robots", "runtime/language"),
-    "logs/file": ("robots", "runtime/language", "runtime/running"),
+    "logs/file": ("files", "robots", "runtime/language", "runtime/running"),
     "logs/viewing": ("files", "logs/file", "hal/sensors", "mathematics", "robots", "runtime/language"),
     "logs/recording": (
         "processes", "logs/file", "logs/viewing", "mathematics", "robots", "runtime/language", "runtime/running",
         "runtime/placement", "runtime/links",
     ),
-    "logs/replay": ("files", "logs/file", "logs/viewing", "robots", "runtime"),
+    "logs/replay": ("files", "blocks/signals", "logs/file", "logs/viewing", "robots", "runtime"),
     "logs/exporting": (
         "logs/file", "hal/sensors", "logs/viewing", "mathematics", "robots", "runtime/language",
     ),

@@ -28,6 +28,7 @@ from ...robots.shapes import surface
 from ...robots.surfaces import quaternion_from_z, robot_surfaces
 from ...runtime.language.errors import AloftError, pip_line
 from ...runtime.language.extensions import is_provided, missing_extension, provided
+from ...runtime.language.importing import without_imports
 from ..file.format import RecordedField, RecordedRows, nanoseconds
 from ..file.reader import RecordedRun
 from ..file.table import chosen
@@ -377,15 +378,20 @@ def export(kind: str, run: RecordedRun, path: Path, names: Sequence[str] = ()) -
         OSError: the file cannot be written.
     """
     if path.is_char_device() or path.is_fifo():  # such as /dev/stdout
-        EXPORTS[kind](run, path, names)
+        _write(kind, run, path, names)
         return
     folder = path.with_name(f"{path.name}.part")
     shutil.rmtree(folder, ignore_errors=True)  # of an export that was killed
     folder.mkdir()
     try:
-        EXPORTS[kind](run, folder / path.name, names)
+        _write(kind, run, folder / path.name, names)
         if path.is_dir():
             raise FileExistsError(EEXIST, "the folder is there already", str(path))
         os.replace(folder / path.name, path)
     finally:
         shutil.rmtree(folder)
+
+
+def _write(kind: str, run: RecordedRun, path: Path, names: Sequence[str]) -> None:
+    with without_imports():  # a robot may carry sensors of a module of the recording's
+        EXPORTS[kind](run, path, names)
