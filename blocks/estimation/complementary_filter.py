@@ -17,8 +17,8 @@ from .inertial_estimator import (
     forget_samples,
     is_unaccelerated,
     learn_bias,
-    place_points,
     predict,
+    set_point_positions,
     use_contacts,
 )
 
@@ -67,6 +67,6 @@ class ComplementaryFilter(InertialEstimator):
             correct_tilt_from_gravity(
                 estimate.orientation, scratch.force, params.tilt_gain, scratch.vector
             )
-        place_points(estimate, legs)
+        set_point_positions(estimate, legs)
         points.weights[:] = 1.0 if points.active else 0.0
         use_contacts(estimate, legs, base, params, constants, scratch, 1.0, 1.0)

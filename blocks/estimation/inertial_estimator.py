@@ -342,7 +342,7 @@ def learn_bias(learning: BiasSamples, block_size: int, bias: Vector3, prior: flo
 
 
 @kernel
-def place_points(estimate: BaseEstimate, legs: LegKinematics) -> None:
+def set_point_positions(estimate: BaseEstimate, legs: LegKinematics) -> None:
     """Rotate the places and rates of the points to the world, by the corrected orientation."""
     motion, points = legs.motion, legs.points
     for point in range(motion.points.shape[0]):

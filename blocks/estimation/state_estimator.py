@@ -29,8 +29,8 @@ from .inertial_estimator import (
     is_unaccelerated,
     learn_bias,
     limit,
-    place_points,
     predict,
+    set_point_positions,
     use_contacts,
 )
 
@@ -149,7 +149,7 @@ class StateEstimator(InertialEstimator):
                 correct_tilt_from_gravity(
                     estimate.orientation, scratch.force, params.tilt_gain, scratch.vector
                 )
-        place_points(estimate, legs)
+        set_point_positions(estimate, legs)
         trusted, support = trust_points(estimate, trust, legs, params, constants, scratch)
         use_contacts(estimate, legs, base, params, constants, scratch, trusted, support)
 

@@ -17,10 +17,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...mathematics.arrays import Array, Array1D
+from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.elementary import exp
 from ...mathematics.kernel import kernel
 from ...runtime.language.steps import signal_call
+from .effect import Effect, StepViews
 
 
 class StribeckFriction(NamedTuple):
@@ -40,7 +42,7 @@ def set_friction(velocity: Array1D, friction: StribeckFriction, loss: Array1D) -
         loss[k] = friction.coulomb[k] + friction.beyond[k] * exp(-ratio * ratio)
 
 
-def falling_friction(
+def friction_call(
     velocity: Array, loss: Array, static: tuple[float, ...], stribeck_velocity: float
 ) -> KernelCall:
     """Return the call that brings the friction losses up to date before a physics step.
@@ -55,3 +57,14 @@ def falling_friction(
     coulomb = np.array(loss)
     friction = StribeckFriction(coulomb, coulomb * (np.array(static) - 1.0), stribeck_velocity)
     return signal_call(set_friction, velocity, friction, loss)
+
+
+class FallingFriction(Effect):
+    """Static friction of a simulated robot's joints; arguments as for ``friction_call``."""
+
+    def __init__(self, loss: Array, static: tuple[float, ...], stribeck_velocity: float) -> None:
+        self._given = loss, static, stribeck_velocity
+
+    def model_calls(self, views: StepViews) -> list[Call]:
+        """Bring the friction losses up to date."""
+        return [friction_call(views.velocity, *self._given)]

@@ -12,47 +12,22 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
-from ..blocks.jumping.plan_progress import speed_error
-from ..files.nodes import text_of
-from ..hal.simulated.simulated_robot import SimulatorParameters
-from ..mathematics.arrays import Array
-from ..mathematics.constants import GRAVITY
-from ..planner.library.library import shipped_folder
-from ..planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
-from ..runtime.graph import load
-from ..runtime.language.errors import AloftError
-from ..runtime.language.flat_graph import FlatGraph
-from ..runtime.loading.reading.files import settings_of
-from ..runtime.running.run_result import RunResult
-from .batch.jobs import job_results
-from .batch.seeds import overrides_for
-
-
-def trial_settings(trial: str, option: str = "--trial") -> dict[str, Any]:
-    """Return the settings of a trial. What only other trials set goes back to the simulator's
-    defaults.
-
-    Raises:
-        AloftError: there is no such trial.
-    """
-    if not trial:
-        return {}
-    files = {file.stem: file for file in sorted((shipped_folder() / "trials").glob("*.yaml"))}
-    if trial not in files:
-        raise AloftError(f"{option} {trial}: there is {', '.join(files)}")
-    defaults = SimulatorParameters().model_dump(mode="json", round_trip=True)
-    found = {
-        f"{block}.{name}": defaults[name]
-        for file in files.values()
-        for block, name in (key.split(".")[:2] for key in settings_of(file))
-    }
-    # a group of parameters goes back as a whole, before what is set within it
-    return found | settings_of(files[trial])
-
+from ...blocks.jumping.plan_progress import speed_error
+from ...files.nodes import text_of
+from ...mathematics.arrays import Array
+from ...mathematics.constants import GRAVITY
+from ...planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
+from ...runtime.graph import load
+from ...runtime.language.errors import AloftError
+from ...runtime.language.flat_graph import FlatGraph
+from ...runtime.running.run_result import RunResult
+from ..batch.jobs import job_results
+from ..batch.seeds import overrides_for
+from ..trials import trial_settings
 
 Found = TypeVar("Found")
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from aloft.hal.simulated.effects import JointEffects, longest_stribeck_step
-from aloft.hal.simulated.joint_effects import falling_friction
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.simulated.parameters import SimulatorParameters
+from aloft.hal.simulated.stribeck import friction_call
 from aloft.hal.simulated.variation import draw_variation
 from aloft.robots.description import find_robot
 
@@ -40,7 +40,7 @@ def turned(torque: float, seconds: float, speed: float = 0.0) -> float:
 
     model, data = flywheel()
     data.qvel[0] = speed
-    falling = falling_friction(data.qvel, model.dof_frictionloss, (STATIC,), SPEED)
+    falling = friction_call(data.qvel, model.dof_frictionloss, (STATIC,), SPEED)
     for _ in range(round(seconds / model.opt.timestep)):
         falling.run()
         mujoco.mj_step1(model, data)
@@ -70,12 +70,16 @@ def test_a_moving_joint_loses_what_the_closed_form_says(speed: float) -> None:
 def test_friction_at_rest_is_drawn_for_each_joint_and_changes_no_other_draw() -> None:
     robot = find_robot("bruce")
     joints = {"static_friction": 1.5, "static_friction_spread": 0.4, "friction_spread": 0.2}
-    first = draw_variation(SimulatorParameters.model_validate({"joints": joints}), robot)
+    first = draw_variation(
+        SimulatorParameters.model_validate({"actuators": {"joints": joints}}), robot
+    )
     static = np.array(first.static_friction)
     assert len(set(static.tolist())) == len(robot.joints)
     assert (abs((static - 1.0) / 0.5 - 1.0) <= 0.4).all()
     del joints["static_friction"]
-    second = draw_variation(SimulatorParameters.model_validate({"joints": joints}), robot)
+    second = draw_variation(
+        SimulatorParameters.model_validate({"actuators": {"joints": joints}}), robot
+    )
     assert second.static_friction == () and second.friction_of_joint == first.friction_of_joint
 
 

@@ -8,14 +8,14 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...mathematics.ground_surface import NOWHERE, Surface, height_of_ground
+from ..mathematics.ground_surface import NOWHERE, Surface, height_of_ground
 
 if TYPE_CHECKING:
-    from ...robots.description import RobotDescription
+    from .description import RobotDescription
 
 Vector = tuple[float, float, float]
 Grid = tuple[tuple[float, ...], ...]
@@ -191,9 +191,9 @@ class Terrain:
             yield field, Terrain(NOWHERE, (), (field,))
 
 
-@runtime_checkable
-class SupportsScene(Protocol):
-    """Parameters of a block whose world has ground; recordings draw it."""
+class WorldParameters:
+    """A base of parameters of a block whose world has ground; recordings draw it."""
 
     def build_scene(self, robot: RobotDescription | None) -> Terrain:
-        """Build the ground that these parameters describe, for a robot."""
+        """Build the ground that these parameters describe, for a robot; here none."""
+        return Terrain(NOWHERE)
