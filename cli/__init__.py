@@ -32,6 +32,6 @@ def main() -> None:
 
 def make_app(verbs: Iterable[str] | None = None) -> typer.Typer:
     """Make the command line with those verbs, or with all; the files of others are not imported."""
-    from . import app
+    from .app import make_app
 
-    return app.make_app(app.all_verbs() if verbs is None else verbs)
+    return make_app(verbs)

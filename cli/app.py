@@ -45,8 +45,8 @@ ONLY_READ = ("check", "graph", "blocks")
 """The verbs that leave nothing to be closed at the end of the process."""
 
 
-def make_app(verbs: Iterable[str] = VERBS) -> typer.Typer:
-    """Make the command line with those verbs; the files of others are not imported.
+def make_app(verbs: Iterable[str] | None = None) -> typer.Typer:
+    """Make the command line with those verbs, or with all; the files of others are not imported.
 
     Raises:
         ExtensionError: an extension's declaration is wrong.
@@ -59,7 +59,7 @@ def make_app(verbs: Iterable[str] = VERBS) -> typer.Typer:
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
     )
-    for verb in verbs:
+    for verb in all_verbs() if verbs is None else verbs:
         offered = _of_the_core(verb) if verb in VERBS else _of_extensions(verb)
         if isinstance(offered, typer.Typer):
             app.add_typer(offered)
@@ -114,11 +114,11 @@ def _extension_verbs() -> tuple[str, ...]:
 
 
 def _why_unknown(arguments: list[str]) -> str:
-    """The sentence about a verb that an extension has which is not here; empty for any other."""
+    """Return the sentence about a verb of an extension that is not here; empty for any other."""
     from ..runtime.language.extensions import SHIPPED, missing_extension, own_extensions
 
     for name, verbs in SHIPPED.items():
-        for verb in verbs:
+        for verb in all_verbs() if verbs is None else verbs:
             if name not in own_extensions() and verb.split() == arguments[: len(verb.split())]:
                 return missing_extension(name, f"'aloft {verb}'")
     return ""

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class LibraryOptions:
+class PlanLibraryOptions:
     """The library of plans, and what becomes of the plans in it."""
 
     keep: Annotated[
@@ -89,7 +89,7 @@ def plan(
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for pictures and recordings.")] = Path("plans"),
     *,
-    library: LibraryOptions,
+    library: PlanLibraryOptions,
     pool: PoolOptions,
     no_pictures: Annotated[
         bool, typer.Option("--no-pictures", help="Write no picture and no recording.")
@@ -123,7 +123,7 @@ def plan(
 
 def plan_tasks(
     paths: list[Path],
-    kept: LibraryOptions,
+    kept: PlanLibraryOptions,
     out: Path | None,
     search: SearchOptions,
     screen: Console,

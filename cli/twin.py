@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -46,7 +46,7 @@ def twin(
     Run a graph with hal.BearRobot against it: the file that is written names the ports.
     """
     from ..hal.bear.configuration import Hardware
-    from ..hal.simulated.simulated_robot import SimulatorParameters
+    from ..hal.simulated.parameters import SimulatorParameters
     from ..hal.twin.injected_faults import read_fault
     from ..hal.twin.server import TwinServer
     from ..hal.twin.twin import standing_twin
@@ -98,21 +98,27 @@ def _wait(seconds: float) -> None:
             signal.signal(number, handler)
 
 
-def _settings(texts: list[str]) -> dict[str, object]:
+def _settings(texts: list[str]) -> dict[str, Any]:
     """Parse ``name=value`` texts as parameters. Raises ``AloftError``."""
     import yaml
 
-    from ..hal.simulated.simulated_robot import SimulatorParameters
+    from ..hal.simulated.parameters import SimulatorParameters
     from ..robots.validation.errors import nearest
+    from ..runtime.language.parameters import declared_fields
 
-    found: dict[str, object] = {}
+    known = {**SimulatorParameters.model_fields, **dict(declared_fields(SimulatorParameters))}
+    found: dict[str, Any] = {}
     for text in texts:
         name, equals, value = text.partition("=")
         if not equals:
             raise AloftError(f"--set {text}: expected name=value")
-        if name not in SimulatorParameters.model_fields:
-            near = nearest(name, SimulatorParameters.model_fields)
+        if name not in known:
+            near = nearest(name, known)
             hint = f"; did you mean {near}?" if near else ""
             raise AloftError(f"--set {text}: the simulator has no parameter {name!r}{hint}")
-        found[name] = yaml.safe_load(value)
+        *groups, last = name.split(".")
+        inside = found
+        for group in groups:
+            inside = inside.setdefault(group, {})
+        inside[last] = yaml.safe_load(value)
     return found

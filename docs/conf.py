@@ -22,7 +22,13 @@ release = aloft.__version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 source_suffix = {".md": "markdown"}
 root_doc = "docs/index"
-include_patterns = ["*.md", "docs/**"]
+include_patterns = [
+    "*.md",
+    "docs/**",
+    "extensions/*/*.md",
+    "extensions/export/demo/README.md",
+    "lab/README.md",
+]
 exclude_patterns = ["**/__pycache__", "**/.*"]
 
 html_theme = "furo"

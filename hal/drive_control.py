@@ -276,7 +276,7 @@ def true_torque(gears: Gears, motor: int, asked: float, speed: float) -> float:
 
 
 class TorqueScratch(NamedTuple):
-    """Of the motors: torque and speed, (n_joints,)."""
+    """Torque and speed of the motors, (n_joints,)."""
 
     torque: Array1D
     speed: Array1D
@@ -302,7 +302,7 @@ def correct_torque(
 
 @kernel
 def smallest_share(gears: Gears, motor: int, commanded: Array1D, drives: Array1D) -> float:
-    """Of a motor, the least share of the drives' gains among the joints it moves."""
+    """Return the least share of the drives' gains among the joints that a motor moves."""
     share = 1.0
     for joint in range(commanded.shape[0]):
         own = drives[joint]
@@ -422,7 +422,7 @@ def gears_of(
     )  # fmt: skip
 
 
-def correcting(
+def correction_calls(
     params: DriveGains, robot: RobotDescription, velocity: Array, torque: Array
 ) -> list[KernelCall]:
     """Return the call that corrects measured joint torques; none where all motors are nominal."""

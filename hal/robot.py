@@ -286,9 +286,9 @@ class Robot(Block, ABC):
 
     @cached_property
     def _well(self) -> KernelCall:
-        return self.reporting()
+        return self.report_call()
 
-    def reporting(self) -> KernelCall:
+    def report_call(self) -> KernelCall:
         """Return the call that writes to ``health`` that all is well, at the tick's own time."""
         clock = self.context.clock
         return signal_call(report_healthy, clock.present, clock.base_period, self.health)

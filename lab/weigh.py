@@ -24,8 +24,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LEFT_OUT = ("tests/", "docs/", "scripts/")
-BESIDE = "benchmarks"
-"""A folder that comes with the source but is no part of the package: its row is below the total."""
+BESIDE = ("extensions", "lab")
+"""The folders beside the core: their rows are below the total, which is the core's, and "all" is the sum."""
 SHORT = 60
 """A file with fewer lines is short."""
 WIDEST = 8
@@ -128,15 +128,23 @@ def parse(texts: dict[str, str]) -> list[Source]:
         Source(path, text, ast.parse(text))
         for path, text in sorted(texts.items())
         if not path.startswith(LEFT_OUT)
+        and "/tests/" not in path
+        and not path.endswith("conftest.py")
     ]
 
 
 def weigh(sources: list[Source]) -> dict[str, Weight]:
-    """Count the weight of each folder, of the whole package as ``total``, and of everything beside
-    it."""
-    weights = weigh_folders([each for each in sources if each.folder != BESIDE])
-    if beside := [each for each in sources if each.folder == BESIDE]:
-        weights[BESIDE] = weigh_folders(beside)["total"]
+    """Count the weight of each folder of the core, of the core as ``total``, of each extension and the
+    lab, and of everything as ``all``."""
+    weights = weigh_folders([each for each in sources if each.folder not in BESIDE])
+    rooms: dict[str, list[Source]] = defaultdict(list)
+    for each in sources:
+        if each.folder in BESIDE:
+            depth = 2 if each.folder == "extensions" else 1
+            rooms["/".join(Path(each.path).parts[:depth])].append(each)
+    for room, inside in rooms.items():
+        weights[room] = weigh_folders(inside)["total"]
+    weights["all"] = weigh_folders(sources)["total"]
     return weights
 
 
@@ -315,8 +323,9 @@ def as_data(weights: dict[str, Weight]) -> dict[str, object]:
 def print_table(now: dict[str, Weight], base: dict[str, Weight] | None) -> None:
     """Print a row for each folder; with a base a second one with the numbers of the revision."""
     folders = {*now, *(base or {})}
-    names = [*sorted(folders - {"total", BESIDE}), "total", *folders.intersection({BESIDE})]
-    print(" " * 14 + "".join(f"{measure:>15}" for measure in MEASURES))
+    beside = sorted(name for name in folders if name.startswith(BESIDE))
+    names = [*sorted(folders - {"total", "all", *beside}), "total", *beside, "all"]
+    print(" " * 26 + "".join(f"{measure:>15}" for measure in MEASURES))
     for name in names:
         print(row(name, now.get(name)))
         if base is not None:
@@ -330,7 +339,7 @@ def print_table(now: dict[str, Weight], base: dict[str, Weight] | None) -> None:
 
 def row(name: str, weight: Weight | None) -> str:
     counts = weight.counts if weight is not None else Counter()
-    return f"{name:<14}" + "".join(f"{counts[measure]:>15,}" for measure in MEASURES)
+    return f"{name:<26}" + "".join(f"{counts[measure]:>15,}" for measure in MEASURES)
 
 
 if __name__ == "__main__":

@@ -78,7 +78,7 @@ def body_motion(n_joints: int) -> BodyMotion:
 
 
 @kernel
-def place_bodies(tree: BodyTree, position: Array1D, motion: BodyMotion) -> None:
+def set_body_poses(tree: BodyTree, position: Array1D, motion: BodyMotion) -> None:
     """Compute the places of all bodies at the joints' positions [rad, or m for a slide],
     (n_joints,)."""
     for k in range(position.shape[0]):

@@ -203,7 +203,7 @@ def remove_contact(point: int, covariance: Array2D) -> None:
 
 
 @kernel
-def place_jacobian(world_jacobian: Array2D, offsets: int, jacobian: Array2D) -> None:
+def position_jacobian(world_jacobian: Array2D, offsets: int, jacobian: Array2D) -> None:
     """Compute the measurement Jacobian H (3, n) of a point's position by leg kinematics.
 
     The columns of the point itself are left to ``measurement_jacobian``.
@@ -233,7 +233,7 @@ def add_contact(
     """Add a contact point to the covariance, at the position measured by leg kinematics.
 
     Args:
-        jacobian: H from ``place_jacobian``; the error of the new point is -H e plus noise.
+        jacobian: H from ``position_jacobian``; the error of the new point is -H e plus noise.
         noise: covariance of the measured position [m^2], (3, 3).
         rows, corner: scratch, (3, n) and (3, 3).
     """
@@ -266,7 +266,7 @@ def innovation(point: int, world_point: Vector3, vectors: Rows3, residual: Vecto
 
 @kernel
 def measurement_jacobian(point: int, jacobian: Array2D) -> None:
-    """Fill in the point's own columns of the measurement Jacobian from ``place_jacobian``."""
+    """Fill in the point's own columns of the measurement Jacobian from ``position_jacobian``."""
     first = 9 + 3 * point
     for i in range(3):
         for k in range(3):

@@ -29,7 +29,7 @@ from .linear_algebra import multiply_matrices, solve_positive, solve_rows
 
 
 @kernel
-def landing_place(
+def landing_position(
     nominal: Array1D,
     side: float,
     linear: Array1D,
@@ -69,7 +69,7 @@ def keep_within(p_max: Vector2, centre: Array1D, planned: Array1D, place: Array1
 
 
 @kernel
-def pull_to_place(goal: Array1D, miss: Array1D, gain: float, width: float) -> None:
+def pull_to_position(goal: Array1D, miss: Array1D, gain: float, width: float) -> None:
     """Move the landing place with regard to balance towards the planned place in the world.
 
     The way from the planned place to the ``goal`` is d = goal + miss. Of this way the share

@@ -3,10 +3,16 @@
 DAQP and Clarabel are called directly; any other solver is called through qpsolvers, which imports SciPy
 and every solver that is installed: about 0.4 s that no process pays that does without them. Programs with
 round friction cones go to Clarabel, an interior-point method.
+
+An answer counts only if it is optimal. A solver whose status says less has found none; and as some call a point
+optimal that is not (ProxQP does not look at the duality gap), the optimality conditions are evaluated for every
+solver that qpsolvers calls.
 """
 
 from __future__ import annotations
 
+import difflib
+import warnings
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from typing import Any
@@ -21,6 +27,32 @@ DAQP, CLARABEL = "daqp", "clarabel"
 EQUALITY = 5
 """DAQP's mark of a row that is an equality."""
 UNBOUNDED = -1e30
+NO_BOUND = 1e12
+"""A bound that is larger than so many times the largest element of its row never binds, and is left out: interior-point
+methods scale by it and lose the digits of all others."""
+PACKAGES = {
+    "clarabel": "clarabel",
+    "daqp": "daqp",
+    "osqp": "osqp",
+    "piqp": "piqp",
+    "proxqp": "proxsuite",
+    "quadprog": "quadprog",
+}
+"""The solvers that are tested, and what pip calls them."""
+SETTINGS: Mapping[str, Mapping[str, Any]] = {
+    "osqp": {"eps_abs": 1e-8, "eps_rel": 1e-8, "max_iter": 50_000},  # its own 1e-3 leaves 1 N
+    "proxqp": {
+        "eps_abs": 1e-9,
+        "eps_rel": 0.0,
+        "check_duality_gap": True,  # without, it takes points that are 0.3 N off
+        "eps_duality_gap_abs": 1e-6,
+        "eps_duality_gap_rel": 1e-9,
+    },
+}
+"""What these solvers need to find the optimum and not a point near it, unless ``options`` say something else."""
+FEASIBLE, STATIONARY, GAP = 1e-5, 1e-5, 1e-6
+"""What the optimality conditions may be off: constraints in their units or as a share of the bounds, the gradient of the
+Lagrangian as a share of its largest term, and the duality gap as a share of the cost, or absolute where that is below 1."""
 
 
 class QuadraticProgramSolver:
@@ -33,16 +65,17 @@ class QuadraticProgramSolver:
 
     Args:
         name: ``daqp``, ``clarabel``, or any solver that qpsolvers finds installed and that takes dense
-            matrices.
+            matrices; tested are those of ``PACKAGES``.
         options: passed to the solver, e.g. its tolerances.
 
     Raises:
-        LookupError: the solver is not installed; the message names those that are.
+        LookupError: the solver is not installed; the message says how to install it, or names those that are.
     """
 
     @staticmethod
     def check_name(name: str) -> None:
-        """Raise ``LookupError`` if no such solver is installed; the message names those that are.
+        """Raise ``LookupError`` if no such solver is installed; the message says how to install it, or names those
+        that are.
 
         For the usual solvers this takes microseconds. For any other one qpsolvers is imported, which
         takes about 0.3 s.
@@ -52,10 +85,7 @@ class QuadraticProgramSolver:
         from qpsolvers import available_solvers
 
         if name not in available_solvers:
-            raise LookupError(
-                f"no quadratic-program solver {name!r} is installed; "
-                f"there is {', '.join(available_solvers)}"
-            )
+            raise LookupError(_missing(name, available_solvers))
 
     def __init__(self, name: str, options: dict[str, float] | None = None) -> None:
         self.check_name(name)
@@ -84,6 +114,9 @@ class QuadraticProgramSolver:
         if c is not None and self.name != CLARABEL:
             raise ValueError(f"{self.name} has no cones; {CLARABEL} has")
         cones = () if c is None else (c,)
+        if len(h) and h.max() >= NO_BOUND:
+            bounded = h < NO_BOUND * np.maximum(np.abs(g).max(1), 1e-300)
+            g, h = g[bounded], h[bounded]
         try:
             x = self._solve(p, q, g, h, a, b, *cones)
         except Exception:  # noqa: BLE001
@@ -93,6 +126,18 @@ class QuadraticProgramSolver:
         if x is None or not np.isfinite(x).all():
             return None
         return np.asarray(x)
+
+
+def _missing(name: str, installed: list[str]) -> str:
+    if name in PACKAGES:
+        return (
+            f"the quadratic-program solver {name!r} is not installed: pip install {PACKAGES[name]}"
+        )
+    nearest = difflib.get_close_matches(name, [*installed, *PACKAGES], n=1)
+    hint = f"did you mean {nearest[0]}? " if nearest else ""
+    return (
+        f"no quadratic-program solver {name!r} is installed; {hint}there is {', '.join(installed)}"
+    )
 
 
 def _daqp(options: Mapping[str, float]) -> Solve:
@@ -112,13 +157,51 @@ def _daqp(options: Mapping[str, float]) -> Solve:
 
 def _any_solver(name: str, options: Mapping[str, float]) -> Solve:
     """Make a solver that qpsolvers calls."""
-    from qpsolvers import Problem, solve_problem
+    from qpsolvers import Problem, dense_solvers, solve_problem
+
+    settings = {**SETTINGS.get(name, {}), **options}
+    as_taken = (lambda matrix: matrix) if name in dense_solvers else _sparse
 
     def solve(p: Array, q: Array, g: Array, h: Array, a: Array, b: Array) -> Array | None:
-        answer = solve_problem(Problem(p, q, g, h, a, b), name, **options)
-        return answer.x if answer.found else None
+        matrices = [as_taken(matrix) for matrix in (p, g, a)]
+        problem = Problem(matrices[0], q, matrices[1], h, matrices[2], b)
+        with (
+            warnings.catch_warnings()
+        ):  # about a status that is not optimal; then there is no answer
+            warnings.simplefilter("ignore")
+            answer = solve_problem(problem, name, **settings)
+        if not answer.found or answer.x is None or not is_optimal(p, q, g, h, a, b, answer):
+            return None
+        return np.asarray(answer.x)
 
     return solve
+
+
+def is_optimal(p: Array, q: Array, g: Array, h: Array, a: Array, b: Array, answer: Any) -> bool:
+    """Return whether the optimality conditions hold for ``answer.x``, with its multipliers ``y`` of the equations and
+    ``z`` of the inequalities. An answer without multipliers cannot show that it is optimal.
+    """
+    x = answer.x
+    y = np.zeros(0) if not len(b) else answer.y
+    z = np.zeros(0) if not len(h) else answer.z
+    if y is None or z is None or len(y) != len(b) or len(z) != len(h):
+        return False
+    excess = max((g @ x - h).max(initial=0.0), np.abs(a @ x - b).max(initial=0.0))
+    size = max(1.0, np.abs(h).max(initial=0.0), np.abs(b).max(initial=0.0))
+    terms = (p @ x, q, g.T @ z, a.T @ y)
+    largest = max(np.abs(term).max(initial=0.0) for term in terms)
+    gradient = np.abs(terms[0] + terms[1] + terms[2] + terms[3]).max(initial=0.0)
+    gap = abs(x @ terms[0] + q @ x + h @ z + b @ y)
+    cost = max(1.0, abs(x @ terms[0]), abs(q @ x))
+    least = -STATIONARY * max(
+        1.0, np.abs(z).max(initial=0.0)
+    )  # multipliers of inequalities are not negative
+    return bool(
+        excess <= FEASIBLE * size
+        and gradient <= STATIONARY * max(largest, 1e-12)
+        and gap <= GAP * cost
+        and z.min(initial=0.0) >= least
+    )
 
 
 TOLERANCE = 1e-9
@@ -127,12 +210,16 @@ answers."""
 INFEASIBILITY = 1e-12
 """Tolerance of Clarabel's proof that there is no solution. At its own 1e-8 it finds proofs for
 programs that have one."""
-SOLVED = ("Solved", "AlmostSolved", "InsufficientProgress")
-"""States in which its answer is as good as rounding allows at that tolerance."""
+SOLVED = "Solved"
+"""The only state whose answer counts; after ``AlmostSolved`` and ``InsufficientProgress`` it may be far off."""
 
 
 class Clarabel:
     """Clarabel, set up anew in every call, so the answer depends on the problem alone.
+
+    Its data structures are not kept for the next program. That would save a fifth of the time, most of which are its ten
+    iterations; but Clarabel goes on scaling by the first program's numbers, so that the same program has another answer
+    (in the sixth digit) after another one, and a run that is continued from a snapshot other bytes.
 
     Args:
         tolerance: of the gap and the residuals.
@@ -140,10 +227,8 @@ class Clarabel:
 
     def __init__(self, tolerance: float = TOLERANCE) -> None:
         import clarabel
-        from scipy import sparse
 
         self._clarabel: Any = clarabel
-        self._sparse: Any = sparse
         self._settings = clarabel.DefaultSettings()
         self._settings.verbose = False
         for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
@@ -156,14 +241,13 @@ class Clarabel:
         """Solve the program and return Clarabel's whole answer: its ``status``, the minimiser
         ``x``, slacks ``s`` and multipliers ``z`` of the equations, then of the inequalities, then
         of the cones."""
-        matrix = self._sparse.csc_matrix(np.vstack((a, g, -c)))
         bound = np.hstack((b, h, np.zeros(len(c))))
         kinds = [
             self._clarabel.ZeroConeT(len(b)),
             self._clarabel.NonnegativeConeT(len(h)),
             *(self._clarabel.SecondOrderConeT(3) for _ in range(len(c) // 3)),
         ]
-        square = self._sparse.triu(self._sparse.csc_matrix(p), format="csc")
+        square, matrix = _sparse(np.triu(p)), _sparse(np.vstack((a, g, -c)))
         return self._clarabel.DefaultSolver(square, q, matrix, bound, kinds, self._settings).solve()
 
     def solve(
@@ -172,7 +256,18 @@ class Clarabel:
         """Solve the program and return the minimiser x (n,), or ``None`` if the solver found
         none."""
         answer = self.answer(p, q, g, h, a, b, np.zeros((0, len(q))) if c is None else c)
-        return np.asarray(answer.x) if str(answer.status) in SOLVED else None
+        return np.asarray(answer.x) if str(answer.status) == SOLVED else None
+
+
+def _sparse(matrix: Array) -> Any:
+    """Return the matrix in compressed sparse columns; SciPy's own conversion takes four times as long."""
+    from scipy import sparse
+
+    columns = matrix.T
+    of_column, of_row = np.nonzero(columns)
+    starts = np.searchsorted(of_column, np.arange(len(columns) + 1))
+    values = columns[of_column, of_row]
+    return sparse.csc_matrix((values, of_row, starts), shape=matrix.shape)
 
 
 def cone_rows(count: int, n: int, first: int, friction: float) -> Array:

@@ -153,6 +153,31 @@ def from_matrix(matrix: Array2D, out: Array1D) -> None:
 
 
 @kernel
+def between(a: Array1D, b: Array1D, share: float, out: Array1D) -> None:
+    """Compute the unit quaternion at a ``share`` (0 to 1) of the way from ``a`` to ``b``, at an even
+    rate about one axis and the short way round; the order of the elements does not matter.
+
+    Where the two are half a turn apart the axis is not defined.
+    """
+    side = 0.0
+    for k in range(4):
+        side += a[k] * b[k]
+    sign = -1.0 if side < 0.0 else 1.0
+    apart = together = 0.0
+    for k in range(4):
+        apart += (a[k] - sign * b[k]) * (a[k] - sign * b[k])
+        together += (a[k] + sign * b[k]) * (a[k] + sign * b[k])
+    angle = 2.0 * atan2(math.sqrt(apart), math.sqrt(together))  # exact near zero, unlike arccos
+    first, second = 1.0 - share, sign * share
+    if angle > _SMALL:
+        first = sin(first * angle) / sin(angle)
+        second = sign * sin(share * angle) / sin(angle)
+    for k in range(4):
+        out[k] = first * a[k] + second * b[k]
+    normalise(out, out)
+
+
+@kernel
 def exponential(vector: Array1D, out: Array1D) -> None:
     """Compute the unit quaternion of a rotation vector [rad]: axis times angle."""
     x, y, z = vector[0], vector[1], vector[2]

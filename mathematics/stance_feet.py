@@ -36,7 +36,7 @@ def find_stance_feet(contact: Flags1D, foot_of_point: Indices1D, stands: Flags1D
 
 
 @kernel
-def mean_place(points: Array2D, chosen: Flags1D, count: int, out: Array1D) -> None:
+def mean_position(points: Array2D, chosen: Flags1D, count: int, out: Array1D) -> None:
     """Compute the mean (3,) of the ``count`` chosen ones of points (n, 3)."""
     out[:] = 0.0
     for i in range(points.shape[0]):

@@ -35,8 +35,8 @@ from .body_dynamics import (
     inner,
     momentum_of,
     move_bodies,
-    place_bodies,
     point_position,
+    set_body_poses,
     velocity_at,
 )
 from .constants import GRAVITY
@@ -108,7 +108,7 @@ def evaluate_motion(
 ) -> None:
     """All terms at all instants."""
     for i in range(given.position.shape[0]):
-        place_and_move(tree, given.position[i], given.velocity[i], given.bend[i], memory)
+        set_poses_and_velocities(tree, given.position[i], given.velocity[i], given.bend[i], memory)
         composite_inertias(tree, memory.motion, memory.composite)
         momentum_terms(given.velocity[i], i, memory, out)
         point_terms(fixed, given.position[i], i, memory.motion, out)
@@ -117,14 +117,14 @@ def evaluate_motion(
 
 
 @kernel
-def place_at_instants(
+def set_poses_at_instants(
     tree: BodyTree, position: Array2D, motion: BodyMotion, place: Array3D, rotation: Array3D
 ) -> None:
     """Compute the places of all bodies at n positions (n, 7 + n_joints): their origins (n,
     n_bodies, 3) and their rotations to the world, row by row (n, n_bodies, 9)."""
     for i in range(position.shape[0]):
         to_matrix(position[i, 3:7], motion.rotation[0])
-        place_bodies(tree, position[i, 7:], motion)
+        set_body_poses(tree, position[i, 7:], motion)
         for body in range(place.shape[1]):
             for row in range(3):
                 place[i, body, row] = position[i, row] + motion.place[body, row]
@@ -133,7 +133,7 @@ def place_at_instants(
 
 
 @kernel
-def place_and_move(
+def set_poses_and_velocities(
     tree: BodyTree, position: Array1D, velocity: Array1D, bend: Array1D, memory: MotionMemory
 ) -> None:
     """Places, velocities and accelerations of all bodies, while the base does not accelerate."""
@@ -141,7 +141,7 @@ def place_and_move(
     to_matrix(position[3:7], motion.rotation[0])
     rotate(position[3:7], velocity[0:3], motion.velocity[0, 0:3])
     rotate(position[3:7], velocity[3:6], motion.velocity[0, 3:6])
-    place_bodies(tree, position[7:], motion)
+    set_body_poses(tree, position[7:], motion)
     move_bodies(tree, velocity[6:], motion)
     for k in range(bend.shape[0]):
         carrier = tree.parent[k]

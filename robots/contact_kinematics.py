@@ -21,8 +21,8 @@ from ..mathematics.body_dynamics import (
     BodyTree,
     body_motion,
     move_bodies,
-    place_bodies,
     point_position,
+    set_body_poses,
     velocity_at,
 )
 from ..mathematics.kernel import kernel
@@ -88,7 +88,7 @@ def contact_motion(
     tree, motion, down, arm = bodies.tree, bodies.motion, bodies.scratch[0], bodies.scratch[1]
     motion.velocity[0, 3:6] = angular_velocity
     down[:] = 0.0
-    place_bodies(tree, position, motion)
+    set_body_poses(tree, position, motion)
     move_bodies(tree, velocity, motion)
     down[2] = -1.0
     rotate_back(orientation, down, down)

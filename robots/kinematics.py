@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mathematics.arrays import Array, Flags1D
-from ..mathematics.body_dynamics import BodyTree, body_motion, place_bodies
+from ..mathematics.body_dynamics import BodyTree, body_motion, set_body_poses
 from ..mathematics.linear_algebra import product
 from ..mathematics.rotations import axis_rotations, matrices_of_quaternions
 from .limb import FootKind, foot_shape
@@ -126,7 +126,7 @@ def link_poses_in_base(
         position: of the joints [rad, or m for a slide], (n_joints,).
     """
     motion = body_motion(len(robot.joints))
-    place_bodies(body_tree(robot), position, motion)
+    set_body_poses(body_tree(robot), position, motion)
     links = (robot.base, *(joint.child for joint in robot.joints))
     return dict(zip(links, zip(motion.rotation, motion.place, strict=True), strict=True))
 

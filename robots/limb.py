@@ -145,7 +145,7 @@ def read_limb(robot: RobotDescription, foot: int, margin: float = 0.0) -> Limb:
 
 
 @kernel
-def place_limb(
+def set_limb_pose(
     links: Array2D, tip: Array1D, angles: Array1D, anchors: Array2D, pose: Array2D
 ) -> None:
     """Compute the pose of the foot and of the joints from the joint angles.
@@ -208,7 +208,7 @@ def limb_jacobian(links: Array2D, anchors: Array2D, pose: Array2D, out: Array2D)
 
     Args:
         links: of the ``Limb``.
-        anchors, pose: from ``place_limb``.
+        anchors, pose: from ``set_limb_pose``.
     """
     px, py, pz = pose[0, 0], pose[0, 1], pose[0, 2]
     for j in range(links.shape[0]):

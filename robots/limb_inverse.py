@@ -37,7 +37,7 @@ from ..mathematics.linear_algebra import solve_positive
 from .limb import (
     foot_error,
     limb_jacobian,
-    place_limb,
+    set_limb_pose,
     weigh_rows,
 )
 
@@ -88,7 +88,7 @@ def approach(
     points = 3 if tip[6] == 0.0 else 6
     for j in range(n):
         angles[j] = min(max(angles[j], limits[j, 0]), limits[j, 1])
-    place_limb(links, tip, angles, anchors, pose)
+    set_limb_pose(links, tip, angles, anchors, pose)
     square = foot_error(tip, pose, target, weights, error)
     ease, fresh = 0.1, True
     for _ in range(steps):
@@ -127,7 +127,7 @@ def approach(
             trial[j] = min(max(angle, limits[j, 0]), limits[j, 1])
             moved = trial[j] - angles[j]
             promised += moved * (damping * moved + gradient[j])
-        place_limb(links, tip, trial, anchors, pose)
+        set_limb_pose(links, tip, trial, anchors, pose)
         found = foot_error(tip, pose, target, weights, error)
         fresh = found < square
         if fresh:
@@ -177,7 +177,7 @@ def reach(
     for number in range(min(tries, starts.shape[0])):
         if number == 1:
             for k in range(1, starts.shape[0]):
-                place_limb(links, tip, starts[k], anchors, pose)
+                set_limb_pose(links, tip, starts[k], anchors, pose)
                 starts[k, n] = foot_error(tip, pose, target, weights, error)
         if number > 0:
             start = 0
@@ -225,7 +225,7 @@ def limb_velocity(
     anchors, pose = work[:n, :6], work[n : n + 4, :3]
     rows, normal = work[n + 4 : n + 10, :n], work[n + 10 : 2 * n + 10, :n]
     task = work[2 * n + 10, :6]
-    place_limb(links, tip, angles, anchors, pose)
+    set_limb_pose(links, tip, angles, anchors, pose)
     limb_jacobian(links, anchors, pose, rows)
     # The twist is weighted as the rows are: as if it were one more column of the Jacobian.
     column = work[2 * n + 10 : 2 * n + 16, 0:1]

@@ -25,7 +25,7 @@ from .loading import checked_again, checked_file, checked_text
 from .running.executor import Executor
 from .running.real_time import NO_REAL_TIME, RealTimeOptions
 from .running.run_result import RunResult
-from .running.sinks import Sink
+from .running.sink import Sink
 from .running.stepping import SteppedRun
 
 
@@ -134,7 +134,8 @@ class Graph:
         return Graph(checked_again(self.checked.flat, overrides))
 
     def _repr_html_(self) -> str:
-        """The block diagram, for notebooks; without the extension ``studio`` the text of the graph."""
+        """Draw the block diagram, for notebooks; without the extension ``studio`` return the text
+        of the graph."""
         from .language.extensions import is_provided, provided
 
         if is_provided("diagram_svg"):

@@ -1,6 +1,6 @@
 """Pictures of the simulated robot without a screen: MuJoCo's renderer on EGL.
 
-Needs PyOpenGL (``pip install 'aloft-robotics[pictures]'``) and, on Linux, a driver for OpenGL without a
+Needs PyOpenGL (the extra ``pictures``) and, on Linux, a driver for OpenGL without a
 screen; Mesa's does it on the processor: ``apt-get install libegl1 libgl1-mesa-dri``.
 """
 
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from ..hal.simulated.mujoco_model import body_name, mujoco_spec
 from ..mathematics.arrays import Array
 from ..robots.surfaces import normals, robot_surfaces
+from ..robots.terrain import Terrain
 from ..runtime.language.errors import AloftError
-from ..runtime.language.terrain import Terrain
 
 if TYPE_CHECKING:
     from ..robots.description import RobotDescription
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Pixels = NDArray[np.uint8]
 
 REMEDY = (
-    "pip install 'aloft-robotics[pictures]' and, on Linux, apt-get install libegl1 libgl1-mesa-dri; "
+    "install the extra pictures and, on Linux, apt-get install libegl1 libgl1-mesa-dri; "
     "nothing can be drawn without"
 )
 PAINT = {

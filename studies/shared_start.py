@@ -26,11 +26,12 @@ from ..runtime.language.errors import AloftError, RunError
 from ..runtime.language.parameter_change import Adjustment
 from ..runtime.language.parameters import is_live
 from ..runtime.loading.checking.parameters import adjust
-from ..runtime.running.chain import can_be_chained
 from ..runtime.running.memory import BoundGraph, Snapshot
 from ..runtime.running.run_result import RunResult
+from ..runtime.running.sink import Sink
 from ..runtime.running.sinks import RunHash
 from ..runtime.running.stepping import SteppedRun
+from ..runtime.running.tick_calls import can_be_chained
 from .expansion import Job, seeded_graph
 
 EVERY = 10
@@ -104,7 +105,7 @@ class _MemoryBytes:
     remembered: NDArray[np.intp]
 
 
-class _Trace:
+class _Trace(Sink):
     """A sink that keeps what some blocks read, write and remember in each tick in which they run."""
 
     def __init__(self, blocks: Sequence[str]) -> None:
@@ -130,9 +131,6 @@ class _Trace:
                     (tick, self._bus[places.read], self._bus[places.written],
                      self._state[places.remembered])
                 )  # fmt: skip
-
-    def close(self) -> None:
-        """Do nothing."""
 
     def first_difference(self, path: str, start: Snapshot) -> int:
         """Find the first tick in which a block, with its present parameters and on its inputs in

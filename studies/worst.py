@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..runtime.language.errors import AloftError
 from ..runtime.running.run_result import RunResult
-from ..runtime.running.sinks import Sink
+from ..runtime.running.sink import Sink
 from .execution import Run
 from .expansion import job, seeded_graph
 from .journal import Outcome

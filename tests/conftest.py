@@ -34,7 +34,13 @@ def pytest_configure(config: pytest.Config) -> None:
     """Let each worker begin to collect all tests at another place. To rewrite the assertions takes twice
     as long as the rest of it, and a worker reads from the cache what another one has rewritten."""
     if hasattr(config, "workerinput") and config.args_source is config.ArgsSource.TESTPATHS:
-        parts = sorted((*(ROOT / "tests").glob("[a-z]*/"), *(ROOT / "tests").glob("test_*.py")))
+        folders = [ROOT / "tests", *ROOT.glob("extensions/*/tests"), ROOT / "lab" / "tests"]
+        parts = sorted(
+            part
+            for folder in folders
+            for kind in ("[a-z]*/", "test_*.py")
+            for part in folder.glob(kind)
+        )
         number, count = int(config.workerinput["workerid"][2:]), config.workerinput["workercount"]
         first = len(parts) * number // count
         config.args = [str(part) for part in (*parts[first:], *parts[:first])]

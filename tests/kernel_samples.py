@@ -22,18 +22,18 @@ from aloft.mathematics.whole_body_motion import (
     MotionTerms,
     PushedTurns,
     motion_memory,
-    place_and_move,
+    set_poses_and_velocities,
     turn_memory,
 )
 from aloft.mathematics.whole_body_qp import RigidBodyTerms
-from aloft.planner.library.jump_table import FlightRotation, TableRows, fed_forward
+from aloft.planner.library.jump_table import FlightRotation
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import read_leg
 from aloft.robots.kinematics import body_tree
 from aloft.robots.limb import read_limb
 from aloft.robots.limb_inverse import limb_scratch
+from aloft.robots.terrain import Ground, HeightField, Terrain
 from aloft.runtime.language.steps import as_record
-from aloft.runtime.language.terrain import Ground, HeightField, Terrain
 
 from .robots.limbed_robots import quadruped
 
@@ -187,36 +187,8 @@ EVALUATED = MotionTerms(
     np.zeros((2, 6)), np.zeros((2, 10)),
 )  # fmt: skip
 IN_MOTION = motion_memory(10)
-place_and_move(TREE, AT_TWO.position[1], AT_TWO.velocity[1], AT_TWO.bend[1], IN_MOTION)
+set_poses_and_velocities(TREE, AT_TWO.position[1], AT_TWO.velocity[1], AT_TWO.bend[1], IN_MOTION)
 composite_inertias(TREE, IN_MOTION.motion, IN_MOTION.composite)
-STEERED = {
-    "goal": [0.1, 0.02], "goal_heading": 0.1, "level": 0.0, "before": [0.0, 0.01],
-    "before_heading": 0.0, "before_level": 0.0, "heading": 0.2, "asked": [0.1, 0.01, 0.1, 0.0],
-    "taken": 3, "changed": 0, "nearest": 0,
-}  # fmt: skip
-STEERED_JUMP = {
-    "time": 1.2, "lift_off_time": 1.0, "touchdown_time": 1.3, "com": [0.1, 0.0, 0.4],
-    "com_velocity": [0.3, 0.0, 0.1], "com_acceleration": [0.0, 0.0, -9.8],
-    "foot_position": NORMAL((2, 3)), "foot_velocity": NORMAL((2, 3)), "foot_yaw": [0.1, -0.1], "phase": 3,
-    "orientation": [0.0, 0.1, 0.0, 0.99], "angular_velocity": NORMAL(3), "angular_acceleration": NORMAL(3),
-    "angular_momentum": NORMAL(3), "angular_momentum_rate": NORMAL(3),
-}  # fmt: skip
-MOVED = {
-    "moves": 1, "landing": [0.04, -0.01, 0.02, 0.1], "thrown": [0.04, -0.01, 0.02, 0.1],
-    "thrust_began": [0.8, 0.8, 0.8, 0.8], "place": 0.01 * NORMAL(4), "rate": 0.1 * NORMAL(4),
-    "acceleration": NORMAL(4), "final_rate": NORMAL(4), "swing_began": 1.0,
-    "swing": 0.01 * NORMAL(4), "swing_rate": 0.1 * NORMAL(4),
-}  # fmt: skip
-RETARGETED = {
-    "retarget_time": 0.1, "retarget_window": 0.2, "retarget_acceleration": 3.0, "retarget_limit": 0.05,
-    "retarget_braking": 1.0, "retarget_spin": 20.0, "retarget_height": 0.03, "retarget_turn": 0.3,
-    "foothold_time": 0.05, "foothold_limit": 0.03, "foothold_turn": 0.2,
-}  # fmt: skip
-TURNED_ROBOT = {"centroidal_matrix": NORMAL((6, 16)), "base_rotation": np.eye(3)}
-MOTION_ROOM = {
-    "quaternion": np.zeros(4), "axis": np.zeros(3), "spin": np.zeros(3), "middle": np.zeros(3),
-    "middle_rate": np.zeros(3),
-}  # fmt: skip
 TURNING = PushedTurns(
     np.tile(np.eye(3), (5, 1, 1)), 0.1 * NORMAL((5, 3)), NORMAL((5, 3, 3)), np.array([0.01, 0.02]),
     np.array([0, 2]), np.array([[0.1, 0.3, -0.2, 0.9]]), NORMAL((1, 3)), NORMAL((1, 3)),
@@ -263,10 +235,10 @@ UNUSED = {
     "aloft.mathematics.whole_body_motion.evaluate_motion": (
         TREE, SOLES_OF_TREE, AT_TWO, motion_memory(10), EVALUATED,
     ),
-    "aloft.mathematics.whole_body_motion.place_at_instants": (
+    "aloft.mathematics.whole_body_motion.set_poses_at_instants": (
         TREE, AT_TWO.position, body_motion(10), np.zeros((2, 11, 3)), np.zeros((2, 11, 9)),
     ),
-    "aloft.mathematics.whole_body_motion.place_and_move": (
+    "aloft.mathematics.whole_body_motion.set_poses_and_velocities": (
         TREE, AT_TWO.position[0], AT_TWO.velocity[0], AT_TWO.bend[0], motion_memory(10),
     ),
     "aloft.mathematics.whole_body_motion.momentum_terms": (
@@ -326,7 +298,7 @@ UNUSED = {
     "aloft.blocks.control.leg_inverse_kinematics.lead_share": FOLLOWED[1:2],
     "aloft.blocks.control.leg_inverse_kinematics.excess_pitch": (np.eye(3), 0.1),
     "aloft.blocks.control.leg_inverse_kinematics.level_sole": (1, *FOLLOWED[:5], 0.1),
-    "aloft.blocks.control.balance_target.correct_place": PLACE,
+    "aloft.blocks.control.balance_target.correct_position": PLACE,
     "aloft.blocks.jumping.capture_step.best_foot": (*STEPPING, STEP_SCRATCH, 5.7),
     "aloft.blocks.jumping.capture_step.aim_step": (*STEPPING, STEP_SCRATCH, 1, 5.7, 0.05),
     "aloft.blocks.jumping.capture_step.swing_foot": (
@@ -358,8 +330,8 @@ UNUSED = {
         BASE, *ROW, *records({"rest_time": 0.5}, {"planned": True}, {"ending": 0, "landed": 0.0}),
     ),
     "aloft.blocks.scoring.jump_score.record_jump": (*ROW, *records({"ground_tolerance": 0.005}), True),
-    "aloft.blocks.scoring.jump_score.compare_place": ROW,
-    "aloft.blocks.scoring.jump_score.keep_place": (ROW[1],),
+    "aloft.blocks.scoring.jump_score.compare_landing_position": ROW,
+    "aloft.blocks.scoring.jump_score.keep_position": (ROW[1],),
     "aloft.blocks.scoring.jump_score.keep_worst": (np.array(0.1), np.array(1), 0.2, 2),
     "aloft.hal.simulated.base.report_fixed": (BASE,),
     "aloft.hal.simulated.base.report_planar": (POSE[0], POSE[3], BASE),
@@ -390,12 +362,12 @@ UNUSED = {
     "aloft.mathematics.rotations.pattern_turn": (
         POSE, POSE[0], TARGET, np.array([0.01, 0.02, 0.0]),
     ),
-    "aloft.mathematics.landing_law.landing_place": (
+    "aloft.mathematics.landing_law.landing_position": (
         POSE[0], 1.0, POSE[1], POSE[2], np.array([0.1, 0.2, 0.3]), np.array([0.3, 0.2, 0.1]), 0.05,
         np.array([0.1, 0.2]), POSE[3], np.zeros(3),
     ),
     "aloft.mathematics.landing_law.turn_places": (POSE, 0.3, np.zeros((4, 3))),
-    "aloft.robots.limb.place_limb": (
+    "aloft.robots.limb.set_limb_pose": (
         LIMB.links, LIMB.tip, MIDDLE, np.zeros((5, 6)), np.zeros((4, 3)),
     ),
     "aloft.robots.limb.limb_jacobian": (LIMB.links, np.ones((5, 6)), POSE, np.zeros((6, 5))),
@@ -511,87 +483,11 @@ UNUSED |= {
     for each in vars(elementwise).values()
     if is_kernel(each) and each.__module__ == elementwise.__name__
 }
-UNUSED["aloft.extensions.hopping.blocks.moved_landing.move_landing"] = (
-    *records(STEERED_JUMP, TURNED_ROBOT, MOVED, MOTION_ROOM),
-)
-UNUSED["aloft.extensions.hopping.blocks.moved_landing.turn_body"] = (
-    0.1, 0.5, 2.0, *records(STEERED_JUMP, TURNED_ROBOT, MOTION_ROOM),
-)  # fmt: skip
-UNUSED["aloft.extensions.hopping.blocks.moved_landing.turn_feet"] = (
-    *records(STEERED_JUMP, MOVED, MOTION_ROOM),
-)
-UNUSED["aloft.extensions.hopping.blocks.moved_landing.thrust_motion"] = (
-    *records(MOVED),
-    1,
-    1.0,
-    0.95,
-)
-UNUSED["aloft.extensions.hopping.blocks.moved_landing.fastest_change"] = 0.5, 3.0, 0.15
-UNUSED["aloft.extensions.hopping.blocks.moved_landing.add_velocity_change"] = (
-    *records(MOVED), 0, 0.04, *records({**STEERED_JUMP, "time": 0.85}, RETARGETED), 0.05,
-)  # fmt: skip
-UNUSED["aloft.extensions.hopping.blocks.moved_landing.place_feet"] = *records(MOVED), 1, 0.05, 0.03
-UNUSED["aloft.extensions.hopping.blocks.moved_landing.begin_swing"] = records(MOVED, STEERED_JUMP)
-UNUSED["aloft.extensions.hopping.blocks.moved_landing.swing_motion"] = (
-    *records(MOVED), 2, *records(STEERED_JUMP), 1.0,
-)  # fmt: skip
-UNUSED["aloft.extensions.hopping.blocks.steered_plan.retarget"] = (
-    *records(
-        {"placed": False, "ahead": 0.12, "aside": -0.01, "turn": 0.1, "up": 0.0, "number": 4},
-        {"phase": 3}, STEERED_JUMP, RETARGETED,
-        {"ahead": 0.32, "back": 0.1, "aside": 0.3, "turn": 0.8},
-        {"outcome": 0}, STEERED, MOVED,
-    ),
-)  # fmt: skip
-STANDING = {"foot_position": NORMAL((2, 3)), "com": np.array([0.1, 0.0, 0.4])}
-UNUSED["aloft.extensions.hopping.blocks.steered_plan.has_moved"] = (
-    np.array([0.11, 0.02, 0.0]), 0.3, 0.05, *records({"asked_from": np.zeros(3), "asked_heading": 0.1}),
-)  # fmt: skip
-UNUSED["aloft.extensions.hopping.blocks.steered_plan.is_at_rest"] = (
-    *records({**STANDING, "com_velocity": NORMAL(3)}, STANDING), 0.05,
-    *records({"middle": np.zeros(3), "middle_rate": np.zeros(3), "vector": np.zeros(3)}),
-)  # fmt: skip
 UNUSED["aloft.blocks.jumping.landing_heuristic.early_touchdown_offset"] = (
     *records(
         {"lift_off_time": 1.0, "touchdown_time": 1.3, "time": 1.27},
         {"foot_position": NORMAL((2, 3)), "contact_position": NORMAL((4, 3))},
     ), 0.02, *records({"lift_off_time": 1.0, "early": 0.001}, {"fall_speed": 1.2}),
-)  # fmt: skip
-WIDTH = len(fed_forward(2, 10))
-ROWS_OF_SPEEDS = TableRows(
-    np.concatenate([np.linspace(0.0, 3.2, 9), np.linspace(8.0, 11.2, 9)]), NORMAL((18, WIDTH)),
-    NORMAL((18, WIDTH)), fed_forward(2, 10), np.array([0.4, 2.8]),
-    np.array([[0.8, 1.05, 1.31], [1.44, 1.56, 1.82], [1.95, 2.07, 2.34], [2.46, 2.59, 2.85]]),
-    np.array([1.31, 1.82, 2.34, 2.85]), np.zeros(4, np.bool_), np.ones((18, 4), np.bool_), np.zeros(WIDTH),
-)  # fmt: skip
-HOPPING = {
-    "jump": 2, "landed": 3, "skipped": 0.5, "place": 0.3, "before": 0.05, "way": 0.1, "goal": 0.4, "begun": 4,
-}  # fmt: skip
-UNUSED["aloft.extensions.hopping.blocks.speed_plan.tell_goal"] = records(
-    HOPPING, {"position": np.zeros(2), "heading": 0.0, "height": 0.0, "number": 0, "outcome": 0}
-)
-UNUSED["aloft.extensions.hopping.blocks.speed_plan.triangle_weight"] = (
-    np.array([0.0, 0.1, 0.2]),
-    1,
-    0.07,
-)
-UNUSED["aloft.extensions.hopping.blocks.speed_plan.begin_next_jump"] = (
-    0.12, 0.05, 30, ROWS_OF_SPEEDS, *records(HOPPING),
-)  # fmt: skip
-UNUSED["aloft.extensions.hopping.blocks.speed_plan.mix_rows"] = (
-    1.9, 0.002, 0.002, ROWS_OF_SPEEDS, np.array([0.0, 8.0]), np.array([0.0, 0.1]),
-    *records(
-        HOPPING,
-        {
-            "com": np.zeros(3), "com_velocity": np.zeros(3), "com_acceleration": np.zeros(3),
-            "orientation": np.zeros(4), "angular_velocity": np.zeros(3), "angular_acceleration": np.zeros(3),
-            "angular_momentum": np.zeros(3), "angular_momentum_rate": np.zeros(3),
-            "foot_position": np.zeros((2, 3)), "foot_velocity": np.zeros((2, 3)), "foot_yaw": np.zeros(2),
-            "foot_pitch": np.zeros(2), "joint_position": np.zeros(10), "joint_velocity": np.zeros(10),
-            "joint_acceleration": np.zeros(10), "joint_torque": np.zeros(10),
-        },
-        {"mixed": np.zeros(WIDTH), "added": np.zeros(2), "raised": np.zeros(2)},
-    ),
 )  # fmt: skip
 UNUSED["aloft.blocks.general.user_code._write_time"] = np.array([7]), 0.002, np.zeros(3)
 

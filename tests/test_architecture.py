@@ -12,17 +12,19 @@ from pathlib import Path
 
 import pytest
 
+from aloft.runtime.language.extensions import own_extensions
 from aloft.runtime.language.registry import find_block, known_names
 
 ROOT = Path(__file__).parent.parent
-PACKAGES = (
-    "processes", "files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "ros2", "fmi", "clib", "logs", "studies", "analysis",
-    "benchmarks", "cli", "graphs",
+CORE = (
+    "processes", "files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs", "studies", "cli", "graphs",
 )  # fmt: skip
+"""The packages of the core, which import no extension and nothing of the lab."""
+PACKAGES = (*CORE, "extensions", "lab")
 ALLOWED: dict[str, tuple[str, ...]] = {
     "processes": (),
     "files": ("runtime/language/errors", "runtime/language/units"),
-    "mathematics": ("processes",),
+    "mathematics": ("processes", "files/cache"),
     "robots": ("files", "mathematics"),
     "runtime/language": ("files", "robots", "mathematics/compiling", "mathematics/kernel", "mathematics/arrays", "mathematics/elementary", "mathematics/ground_surface"),
     "runtime/running": (
@@ -38,9 +40,8 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
         "runtime/transports", "robots",
     ),
-    "runtime/drawing": ("files", "runtime/language", "runtime/loading", "robots"),
     "runtime/live": (
-        "files", "runtime/language", "runtime/loading", "runtime/running", "runtime/drawing",
+        "files", "runtime/language", "runtime/loading", "runtime/running",
         "runtime/placement", "runtime/links", "runtime/transports", "robots",
     ),
     "runtime/testing": (
@@ -49,59 +50,53 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     ),
     "runtime": (
         "files", "runtime/language", "runtime/loading", "runtime/running", "runtime/placement",
-        "runtime/links", "runtime/drawing", "robots",
+        "runtime/links", "robots",
     ),
-    "blocks/signals": ("runtime/language", "planner/task/phase", "extensions/hopping/planner/plan_outcome"),
+    "blocks/signals": ("runtime/language", "planner/task/phase"),
     "blocks": (),
     "planner": (),
     "planner/task": ("files", "mathematics", "robots", "runtime/language", "runtime/loading"),
     "planner/models": ("planner/task", "mathematics", "robots"),
     "planner/problem": ("planner/task", "planner/models", "mathematics", "robots"),
     "planner/solving": (
-        "processes", "planner/task", "planner/models", "planner/problem", "mathematics", "robots",
+        "processes", "files/cache", "planner/task", "planner/models", "planner/problem", "mathematics", "robots",
     ),
     "planner/checking": (
         "planner/task", "planner/models", "mathematics", "robots", "runtime/language",
     ),
     "planner/library": (
         "planner/task", "planner/models", "planner/problem", "planner/solving", "planner/checking",
-        "mathematics", "robots", "runtime/language",
+        "files/cache", "mathematics", "robots", "runtime/language",
     ),
     "extensions/hopping/planner": (
         "planner/task", "planner/models", "planner/problem", "planner/solving", "planner/checking", "planner/library",
-        "mathematics", "robots", "runtime/language",
+        "files/cache", "mathematics", "robots", "runtime/language",
     ),
     "planner/drawing": (
         "planner/task", "planner/models", "planner/checking", "planner/library", "mathematics/arrays", "robots",
     ),
-    "blocks/general": ("blocks/signals", "clib/library", "clib/remote_library", "mathematics", "robots", "runtime/language"),
+    "blocks/general": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "blocks/estimation": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "blocks/control": ("files", "blocks/signals", "mathematics", "robots", "runtime/language"),
     "blocks/jumping": ("blocks/signals", "mathematics", "robots", "runtime/language", "planner"),
     "blocks/scoring": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "hal": ("processes", "files", "blocks/signals", "mathematics", "robots", "runtime/language"),
-    "ros2": ("robots", "runtime/language"),
-    "fmi": ("robots", "runtime/language"),
-    "fmi/exporting": ("fmi", "clib", "robots", "runtime", "logs/file"),
-    "clib": ("mathematics/compiling", "logs/file", "runtime"),
-    "logs/file": ("robots", "runtime/language", "runtime/running"),
+    "logs/file": ("files", "robots", "runtime/language", "runtime/running"),
     "logs/viewing": ("files", "logs/file", "hal/sensors", "mathematics", "robots", "runtime/language"),
     "logs/recording": (
         "processes", "logs/file", "logs/viewing", "mathematics", "robots", "runtime/language", "runtime/running",
         "runtime/placement", "runtime/links",
     ),
-    "logs/replay": ("files", "logs/file", "logs/viewing", "robots", "runtime"),
+    "logs/replay": ("files", "blocks/signals", "logs/file", "logs/viewing", "robots", "runtime"),
     "logs/exporting": (
-        "logs/file", "hal/sensors", "logs/viewing", "mathematics", "robots", "ros2",
-        "runtime/language",
+        "logs/file", "hal/sensors", "logs/viewing", "mathematics", "robots", "runtime/language",
     ),
     "logs": ("logs/file",),
     "studies": ("processes", "files", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs"),
-    "analysis": ("mathematics", "robots", "runtime", "blocks/signals", "logs", "plotting"),
-    "benchmarks": (
-        "clib", "mathematics", "robots", "runtime", "planner", "blocks", "hal", "logs", "studies",
-    ),
-    "cli": PACKAGES,
+    "cli": CORE,
+    **{f"extensions/{each.name}": (*CORE, "plotting", *(f"extensions/{name}" for name in each.needs)) for each in own_extensions().values() if each.name != "lab"},
+    "extensions": (),
+    "lab": PACKAGES,
     "graphs": (),
 }  # fmt: skip
 """The rooms, and which rooms the files of each may import. The longest name that fits a file is its
@@ -127,7 +122,13 @@ ROOMS_BY_NAME = tuple(name for name in PACKAGES if name != "planner")
 
 
 def files(folder: str) -> list[Path]:
-    return sorted(p for p in (ROOT / folder).rglob("*.py") if "__pycache__" not in p.parts)
+    found = (ROOT / folder).rglob("*.py")
+    outside = (
+        {"__pycache__", "tests", "conftest.py", "demo", "pages"}  # programs outside of the package
+        if folder.startswith(("extensions", "lab"))
+        else {"__pycache__"}
+    )
+    return sorted(path for path in found if outside.isdisjoint(path.relative_to(ROOT).parts))
 
 
 def project_files() -> list[Path]:
@@ -210,17 +211,15 @@ def test_every_file_has_a_room() -> None:
     assert not without, "say in ALLOWED what the room may import"
 
 
-@pytest.mark.long
-def test_only_their_verb_imports_the_benchmarks() -> None:
-    """They are not in the wheel."""
-    importing = [
-        path.relative_to(ROOT).as_posix()
-        for package in PACKAGES
-        if package != "benchmarks"
+def test_the_core_imports_no_extension() -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {'.'.join(target)}"
+        for package in CORE
         for path in files(package)
-        if any((own(name) or ("",))[0] == "benchmarks" for name in imports(path))
+        for name in imports(path)
+        if (target := own(name)) is not None and target[0] in ("extensions", "lab")
     ]
-    assert importing == ["lab/cli/bench.py"]
+    assert not wrong, "an extension provides it; see runtime/language/extensions.py"
 
 
 @pytest.mark.parametrize("room", ALLOWED)
@@ -301,11 +300,11 @@ def absolute(path: Path) -> Iterator[tuple[str, ...]]:
 
 
 def block_files() -> dict[tuple[str, ...], Path]:
-    """The modules of blocks and hal in which a block is declared."""
+    """The modules of aloft in which a block is declared."""
     found = {}
     for name in known_names():
         module = tuple(find_block(name).__module__.split(".")[1:])
-        if name.startswith(("blocks.", "hal.", "ros2.", "fmi.")):
+        if name.partition(".")[0] in ("blocks", "hal", *own_extensions()):
             found[module] = ROOT.joinpath(*module).with_suffix(".py")
     return found
 
@@ -335,12 +334,17 @@ def test_blocks_can_be_imported_without_the_libraries_they_compute_with() -> Non
 
 
 def test_one_block_has_one_test_of_the_same_name() -> None:
-    missing = [
-        f"tests/{'/'.join(module[:-1])}/test_{module[-1]}.py"
-        for module in block_files()
-        if not (ROOT / "tests" / Path(*module[:-1]) / f"test_{module[-1]}.py").is_file()
-    ]
+    missing = [test for test in map(own_test, block_files()) if not (ROOT / test).is_file()]
     assert not missing
+
+
+def own_test(module: tuple[str, ...]) -> Path:
+    """The file of a module's tests; those of an extension lie in its own folder."""
+    if module[0] == "extensions":
+        own_folder, inner = Path(*module[:2], "tests"), module[2:]
+    else:
+        own_folder, inner = Path("tests"), module
+    return own_folder.joinpath(*inner[:-1], f"test_{inner[-1]}.py")
 
 
 def test_no_file_is_too_long() -> None:
@@ -419,7 +423,10 @@ def test_hidden_configuration_is_refused() -> None:
 
 def test_documents_that_the_code_names_are_there() -> None:
     for path in project_files():
-        if path.relative_to(ROOT).parts[0] in ("tests", "docs", "cli"):
+        if (
+            path.relative_to(ROOT).parts[0] in ("tests", "docs", "cli", "lab")
+            or "tests" in path.parts
+        ):
             continue  # command lines write pages whose names they say
         for name in re.findall(r"\b[\w/]+\.md\b", path.read_text(encoding="utf-8")):
             assert (ROOT / name).is_file(), f"{path.relative_to(ROOT)} names {name}"

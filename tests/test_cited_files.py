@@ -26,8 +26,6 @@ EXAMPLES = {
     "tasks/hop.yaml",
 }
 """What ``aloft test --from`` writes in an example of docs/replay.md, and a task of a user's own."""
-FORMER = {"controllers/rising_heels.yaml"}
-"""What the changelog says to be gone."""
 ENDINGS = "py|pyi|md|ya?ml|toml|json|txt|csv|svg|png|xml|urdf|npz"
 PATH = re.compile(rf"(?<![\w./$~{{<>*:-])(?:[\w-]+/)*[\w-]+\.(?:{ENDINGS})(?![\w/*{{-])")
 TEST = re.compile(r"\b([\w/]*test_\w+\.py)::(\w+)")
@@ -63,6 +61,15 @@ def words_of(source: str) -> Iterator[str]:
                 yield text
 
 
+def all_pages() -> list[Path]:
+    """The pages of the core, the extensions and the lab."""
+    folders = ("docs", "extensions", "lab")
+    return [
+        *ROOT.glob("*.md"),
+        *(p for name in folders for p in sorted((ROOT / name).rglob("*.md"))),
+    ]
+
+
 def missing_in_code(source: str) -> list[str]:
     """The files that the comments and docstrings of Python code cite and that are not there."""
     if not missing(iter([source]), code=True):
@@ -73,7 +80,7 @@ def missing_in_code(source: str) -> list[str]:
 def missing(texts: Iterator[str], *, code: bool) -> list[str]:
     """The files that texts cite and that are not there."""
     cited = {path for text in texts for path in PATH.findall(text)}
-    cited -= EXAMPLES | FORMER | there()
+    cited -= EXAMPLES | there()
     wrong = [path for path in cited if "/" in path and path.split("/")[0] in folders()]
     if code:
         wrong += [path for path in cited if "/" not in path and path.endswith((".py", ".md"))]
@@ -93,7 +100,7 @@ def test_files_that_code_cites_are_there(folder: str) -> None:
 
 
 def test_files_that_pages_cite_are_there() -> None:
-    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
+    pages = [page for page in all_pages() if page.name != "CHANGELOG.md"]  # names what is gone, too
     assert len(pages) > 20
     wrong = {
         page.name: names
@@ -106,12 +113,14 @@ def test_files_that_pages_cite_are_there() -> None:
 def test_tests_that_pages_cite_are_there() -> None:
     """A page proves a statement by a test's file and name."""
     cited = {
-        (page.name, *found)
-        for page in (ROOT / "docs").rglob("*.md")
-        for found in TEST.findall(page.read_text())
+        (page.name, *found) for page in all_pages() for found in TEST.findall(page.read_text())
     }
     assert cited
-    code = {path: path.read_text() for path in (ROOT / "tests").rglob("test_*.py")}
+    code = {
+        path: path.read_text()
+        for folder in ("tests", "extensions", "lab")
+        for path in (ROOT / folder).rglob("test_*.py")
+    }
     for page, file, name in sorted(cited):
         of = [text for path, text in code.items() if str(path).endswith(f"/{file}")]
         assert any(f"def {name}(" in text for text in of), f"{page}: {file}::{name}"
@@ -123,11 +132,11 @@ def test_tests_that_pages_cite_are_there() -> None:
         ('"""The order is that of DESIGN.md, section 3."""', ["DESIGN.md"]),
         ("x = 1  # as in runtime/running/chains.py", ["runtime/running/chains.py"]),
         ("# see executors.py", ["executors.py"]),
-        ('"""See tests/graphs/no_such.yaml (wrong) and running/chain.py."""',
+        ('"""See tests/graphs/no_such.yaml (wrong) and running/ticker.py."""',
          ["tests/graphs/no_such.yaml"]),
         ('class A:\n    x = 1\n    """As docs/nowhere.md says."""', ["docs/nowhere.md"]),
         ('"""Writes recordings/jump.rrd, results/a.json, FOLDER/b.yaml and mine.yaml."""', []),
-        ('"""As in docs/compiled.md, chain.py and https://x.org/docs/a.md."""', []),
+        ('"""As in docs/compiled.md, ticker.py and https://x.org/docs/a.md."""', []),
         ('path = "docs/not_a_citation.md"', []),
     ],
 )  # fmt: skip

@@ -12,7 +12,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
-NOT_SHIPPED = ("tests", "docs", "scripts")
+NOT_SHIPPED = ("tests", "docs", "scripts", "lab")
 BY = {
     "PIL": "pillow",
     "dask": "distributed",
@@ -59,12 +59,20 @@ def others_modules(source: str) -> Iterator[str]:
 
 
 def python_files(folder: Path) -> list[Path]:
-    return [p for p in sorted(folder.glob("**/*.py")) if "__pycache__" not in p.parts]
+    hidden = {"__pycache__", *(() if folder.name in NOT_SHIPPED else ("tests", "conftest.py"))}
+    return [p for p in sorted(folder.glob("**/*.py")) if hidden.isdisjoint(p.parts)]
 
 
 def undeclared(folders: list[Path], declared: set[str]) -> Iterator[str]:
     for path in (path for folder in folders for path in python_files(folder)):
-        ours = {*sys.stdlib_module_names, "aloft", "tests", *neighbours(path.parent)}
+        ours = {
+            *sys.stdlib_module_names,
+            "aloft",
+            "tests",
+            "extensions",
+            "lab",
+            *neighbours(path.parent),
+        }
 
         def is_undeclared(name: str, ours: set[str] = ours) -> bool:
             return name not in ours and BY.get(name, name).lower() not in declared
@@ -83,5 +91,9 @@ def test_the_package_asks_for_what_it_imports() -> None:
 
 
 def test_the_tests_ask_for_what_they_import() -> None:
-    assert not list(undeclared([ROOT / folder for folder in NOT_SHIPPED], TESTS))
+    assert not list(
+        undeclared(
+            [*(ROOT / folder for folder in NOT_SHIPPED), *ROOT.glob("extensions/*/tests")], TESTS
+        )
+    )
     assert any(undeclared([ROOT / "tests"], PACKAGE)), "pytest is not the package's"

@@ -12,6 +12,7 @@ import linecache
 import math
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -28,15 +29,23 @@ from aloft.mathematics.compiling.translate import Translator
 from aloft.mathematics.kernel import expand, kernel, kernels
 from aloft.robots.description import find_robot
 from aloft.runtime.language import steps
+from aloft.runtime.language.extensions import own_extensions
 from aloft.runtime.language.registry import find_block, known_names
 from aloft.runtime.testing.bench import BlockBench
 from aloft.runtime.testing.conformance import random_inputs, unmet_messages
 
+from . import kernel_samples
 from .hal.sensors.mounting import bruce_with
-from .kernel_samples import UNUSED
 
 ROOT = Path(__file__).parent.parent
-ROOMS = ("mathematics", "blocks", "hal")
+ROOMS = (
+    "mathematics",
+    "blocks",
+    "hal",
+    "extensions/hopping/blocks",
+    "extensions/commissioning/blocks",
+    "extensions/export/blocks",
+)
 HOT = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool", *vars(arrays)} - {"Any"}
 NOT_HOT = {
@@ -67,13 +76,7 @@ NOT_HOT = {
     "mathematics.whole_body_solution.active_set_program": "memory, when a block is set up",
     "mathematics.quadratic_program.cone_rows": "of the program that Clarabel gets",
     "mathematics.whole_body_cones.cone_memory": "memory, when a block is set up",
-    "hal.bear.bring_up.imu_step._millimetres": "of a bring-up, with nothing under power",
-    "hal.bear.bring_up.imu_step._angle_between": "of a bring-up, with nothing under power",
     "hal.bear.configuration.imu_rotation_of": "when a file of the hardware is written",
-    "hal.bear.bring_up.imu_step._straightness": "of a bring-up, with nothing under power",
-    "hal.bear.bring_up.standing_steps.hop": "makes a step of a bring-up",
-    "hal.bear.bring_up.imu_step._words": "of a bring-up, with nothing under power",
-    "hal.bear.bring_up.steps._closest_motor": "of a bring-up, with nothing under power",
     "hal.simulated.scenes.step": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.platform": "makes a scene, when a run is loaded",
     "hal.simulated.scenes.check_slope": "checks a scene, when a graph is loaded",
@@ -101,6 +104,16 @@ SENSORS = {
 
 PYTHON = {bool, int, float}
 """Other numbers, such as those of an enumeration, are made plain ones."""
+
+UNUSED = kernel_samples.UNUSED | {
+    name: arguments
+    for each in own_extensions().values()
+    if (each.folder / "tests" / "kernel_samples.py").is_file()
+    for name, arguments in import_module(
+        f"extensions.{each.name}.tests.kernel_samples"
+    ).SAMPLES.items()
+}
+"""Arguments of the kernels that a jump does not call, those of extensions, too."""
 
 
 def copy(arguments):
@@ -236,7 +249,7 @@ def calls():
         other = {"estimator.use": "blocks.InvariantKalmanFilter", "legs.beyond": "slide"}
         run_jump({**other, "wbc.solver": "daqp"}, duration=0.1)
         other = {"estimator.use": "blocks.ComplementaryFilter", "estimator.flight": "ballistic"}
-        other["robot.bus_period"] = None  # drives that give every joint its own feedback
+        other["robot.actuators.bus_period"] = None  # drives that give every joint its own feedback
         other |= {"safety.tilt_limit": 1e-6, "safety.tilt_hold": 0.0}  # it is damped
         run_jump({**other, "joint_pd.stance_targets": "acceleration"}, duration=0.02)
         weak = {"wbc.torque_margin": 0.15, "wbc.friction": 0.05}  # constraints come and go
@@ -250,7 +263,7 @@ def calls():
         mounted = {"imu_position": [0.01, 0.0, 0.02], "imu_rotation": [0.0, 0.01, 0.02]}
         run_alone("blocks.SensorAlignment", find_robot("bruce"), play=0.01, **mounted)
         gears = {"stiffness": 500.0, "damping": 0.5, "backlash": 0.001}
-        run_alone("hal.MujocoRobot", find_robot("bruce"), gears=gears)
+        run_alone("hal.MujocoRobot", find_robot("bruce"), actuators={"gears": gears})
         for name in known_names():  # blocks that none of these graphs has
             own = [name_of[id(f)] for f in find_block(name).named_steps.values() if is_kernel(f)]
             if not all(samples[each] for each in own):

@@ -20,7 +20,7 @@ from aloft.mathematics.compiling.machine_code import process_triple
 
 ROOT = Path(__file__).parent.parent
 NOT_SHIPPED = {
-    "benchmarks", "tests", "docs", "scripts", "lab", "recordings", "build", "dist", "aloft_robotics.egg-info",
+    "tests", "docs", "scripts", "lab", "recordings", "build", "dist", "aloft_robotics.egg-info",
 }  # fmt: skip
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 LISTED = PROJECT["tool"]["setuptools"]["packages"]
@@ -73,7 +73,9 @@ def test_without_the_source_bench_says_how_to_get_the_benchmarks(
         text=True,
     )
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("error: the benchmarks are not in the wheel; install aloft from")
+    assert done.stderr.startswith(
+        "error: 'aloft bench' is part of the lab, which is not in the wheel; install aloft from"
+    )
     for command in (
         f"pip download --no-deps --no-binary :all: aloft-robotics=={aloft.__version__}",
         f"tar xzf aloft_robotics-{aloft.__version__}.tar.gz",
@@ -140,7 +142,7 @@ def test_the_source_distribution_has_what_the_benchmarks_need(
     assert source_distribution.name == f"aloft_robotics-{aloft.__version__}.tar.gz"
     with tarfile.open(source_distribution) as tar:
         inside = {name.partition("/")[2] for name in tar.getnames()}
-    expected = {path.relative_to(ROOT).as_posix() for path in (ROOT / "benchmarks").rglob("*.py")}
+    expected = {path.relative_to(ROOT).as_posix() for path in (ROOT / "lab").rglob("*.py")}
     for name in zipfile.ZipFile(wheel).namelist():
         if name.startswith("aloft/"):
             expected.add(name.partition("/")[2])
@@ -171,3 +173,22 @@ def test_importing_loads_no_heavy_library(code: str) -> None:
 
 def test_importing_the_package_itself_loads_nothing() -> None:
     assert loaded_by("import aloft") & {"numpy", "pydantic", "typer", "yaml"} == set()
+
+
+def test_the_package_page_has_nothing_that_an_index_cannot_show() -> None:
+    text = (ROOT / PROJECT["project"]["readme"]).read_text()
+    assert "](" not in text and "<img" not in text
+    graph = text.split("```yaml\n")[1].split("```")[0]
+    assert graph in (ROOT / "README.md").read_text()
+
+
+def test_the_extra_all_has_every_extra_of_users() -> None:
+    extras = PROJECT["project"]["optional-dependencies"]
+    (all_of_them,) = extras["all"]
+    assert set(all_of_them.split("[")[1].rstrip("]").split(",")) == set(extras) - {"all", "peers"}
+
+
+def test_notice_names_every_robot_whose_file_is_from_elsewhere() -> None:
+    notice = (ROOT / "NOTICE").read_text()
+    for path in sorted((ROOT / "robots").glob("*/*.yaml")):
+        assert path.stem in notice, path.stem

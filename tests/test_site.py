@@ -28,7 +28,13 @@ from .logs.viewing.browser import PROGRAM, Browser
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
-PAGES = [*sorted(ROOT.glob("*.md")), *sorted(DOCS.rglob("*.md"))]
+PAGES = [
+    *sorted(ROOT.glob("*.md")),
+    *sorted(DOCS.rglob("*.md")),
+    *sorted(ROOT.glob("extensions/*/*.md")),
+    ROOT / "extensions" / "export" / "demo" / "README.md",
+    ROOT / "lab" / "README.md",
+]
 BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^ *```$", re.DOTALL | re.MULTILINE)
 TOCTREE = re.compile(r"```\{toctree\}\n:caption: (\S+)\n:hidden:\n\n(.*?)```", re.DOTALL)
 

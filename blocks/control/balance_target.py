@@ -22,7 +22,7 @@ from ...mathematics.rotations import (
     wrap,
     yaw,
 )
-from ...mathematics.stance_feet import find_stance_feet, mean_place
+from ...mathematics.stance_feet import find_stance_feet, mean_position
 from ...robots.limb import FootKind, foot_shape
 from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, ThreeNumbers, live_parameter
@@ -195,8 +195,8 @@ class BalanceTarget(Block):
         period: float,
     ) -> None:
         count = choose_feet(reference, phase, constants, scratch)
-        mean_place(terms.foot_position, scratch.stands, count, scratch.middle)
-        mean_place(reference.foot_position, scratch.stands, count, scratch.planned_middle)
+        mean_position(terms.foot_position, scratch.stands, count, scratch.middle)
+        mean_position(reference.foot_position, scratch.stands, count, scratch.planned_middle)
         planned = planned_heading(reference, scratch.counted)
         heading = measured_heading(reference, terms, planned, count, constants, scratch)
         if not memory.started or reference.time < 0.0:  # the plan has not begun
@@ -210,7 +210,7 @@ class BalanceTarget(Block):
             turn = heading - planned
             follow_reference(reference, terms, turn, target, constants, scratch)
             if params.place_gain > 0.0:
-                correct_place(reference, memory, target, scratch, params)
+                correct_position(reference, memory, target, scratch, params)
             if phase.phase == Phase.THRUST:
                 correct_lift_off(reference, phase, turn, target, scratch, params, period)
         else:
@@ -323,7 +323,7 @@ def follow_reference(
 
 
 @kernel
-def correct_place(
+def correct_position(
     reference: JumpReference,
     memory: BalanceMemory,
     target: WholeBodyTarget,

@@ -19,9 +19,9 @@ from ...mathematics.body_dynamics import (
     inner,
     momentum_of,
     move_bodies,
-    place_bodies,
     point_jacobian,
     point_position,
+    set_body_poses,
     velocity_at,
 )
 from ...mathematics.compiling.equations import cross
@@ -145,7 +145,7 @@ class Dynamics(Block):
     ) -> None:
         scale = apply_payload(mass, tree, constants, scratch)
         set_base(base, joints, terms, motion, scratch)
-        place_bodies(tree, joints.position, motion)
+        set_body_poses(tree, joints.position, motion)
         move_bodies(tree, joints.velocity, motion)
         equations_of_motion(tree, motion, inertias, constants.rotors, scale, terms)
         write_contacts(tree, motion, terms, constants, scratch)

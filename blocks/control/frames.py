@@ -13,10 +13,10 @@ from ...mathematics.body_dynamics import (
     acceleration_at,
     body_motion,
     move_bodies,
-    place_bodies,
     point_jacobian,
     point_position,
     rotation_jacobian,
+    set_body_poses,
     velocity_at,
 )
 from ...mathematics.compiling.kernel_call import KernelCall
@@ -53,7 +53,7 @@ class FrameModel:
         self._tree, self._motion = body_tree(robot), body_motion(len(robot.joints))
         self._frames: dict[tuple[str, Vector], Frame] = {}
         self.calls: list[KernelCall] = []
-        """What updates all frames in a tick, in this order."""
+        """Calls that update all frames in a tick, in their order."""
 
     def frame(self, name: str, offset: Vector = (0.0, 0.0, 0.0)) -> Frame:
         """Return the frame called ``name``, moved by ``offset`` [m] in its own axes.
@@ -105,7 +105,7 @@ def move_model(
             linear += turn * terms.velocity[column]
             angular += turn * terms.velocity[3 + column]
         motion.velocity[0, row], motion.velocity[0, 3 + row] = linear, angular
-    place_bodies(tree, joints.position, motion)
+    set_body_poses(tree, joints.position, motion)
     move_bodies(tree, terms.velocity[6:], motion)
 
 

@@ -109,8 +109,8 @@ class WholeBodyController(KernelBlock):
     finds the contact forces. ``active_set`` is a dual active-set method that starts cold, so the
     solution is exact up to rounding and depends on the inputs alone; with ``cones: round`` it solves
     the program with the cones themselves, as exactly (``mathematics/whole_body_cones``). Any other name is
-    that of a library's solver; of these only Clarabel takes round cones. Where a library finds no solution, the
-    own method is tried; where that finds none with round cones, the pyramids inside them are.
+    that of a library's solver: ``daqp``, ``quadprog``, ``osqp``, ``clarabel``, ``proxqp``, ``piqp`` are tested, and only Clarabel
+    takes round cones. An answer that is not optimal is none. Where a library finds no solution, the own method is tried; where that finds none with round cones, the pyramids inside them are.
 
     Without a point in stance there is nothing to solve: torque, force and acceleration are zero,
     and the command counts as solved.
@@ -137,7 +137,8 @@ class WholeBodyController(KernelBlock):
             text="the tasks, each an objective for the acceleration",
         )
         solver: str = parameter(
-            ACTIVE_SET, text="active_set, or any dense solver that qpsolvers finds installed"
+            ACTIVE_SET,
+            text="active_set, or a library's solver: daqp, quadprog, osqp, clarabel, proxqp, piqp",
         )
         cones: Literal["pyramid", "round"] = parameter(
             "pyramid", text="shape of the friction cones; the paper's are pyramids"

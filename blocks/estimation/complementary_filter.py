@@ -18,9 +18,9 @@ from .inertial_estimator import (
     forget_samples,
     is_unaccelerated,
     learn_bias,
-    place_points,
     predict,
     publish,
+    set_point_positions,
 )
 
 
@@ -68,7 +68,7 @@ class ComplementaryFilter(InertialEstimator):
             correct_tilt_from_gravity(
                 estimate.orientation, scratch.force, constants.tilt_gain, scratch.vector
             )
-        place_points(estimate, legs)
+        set_point_positions(estimate, legs)
         points.weights[:] = 1.0 if points.active else 0.0
         correct_motion(estimate, legs, params, constants, scratch, 1.0, 1.0)
         publish(estimate, base)

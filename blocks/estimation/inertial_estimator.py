@@ -145,7 +145,7 @@ class InertialEstimator(Block):
     and where it starts.
 
     The step of a derived class calls ``predict``, corrects the orientation, weighs the points, and
-    ends with ``use_contacts``.
+    ends with ``correct_motion`` and ``publish``.
     """
 
     Params = InertialParameters
@@ -271,7 +271,7 @@ def start(
     for foot in range(motion.soles.shape[0]):
         rotate(estimate.orientation, motion.soles[foot], vector)
         estimate.position[:2] -= vector[:2] / motion.soles.shape[0]
-    place_points(estimate, legs)
+    set_point_positions(estimate, legs)
     count = count_standing(standing)
     for point in range(standing.shape[0]):
         if standing[point]:
@@ -376,7 +376,7 @@ def learn_bias(
 
 
 @kernel
-def place_points(estimate: BaseEstimate, legs: LegKinematics) -> None:
+def set_point_positions(estimate: BaseEstimate, legs: LegKinematics) -> None:
     """Rotate the places and rates of the points to the world, by the corrected orientation."""
     motion, points = legs.motion, legs.points
     for point in range(motion.points.shape[0]):

@@ -9,7 +9,7 @@ from ...mathematics.invariant_filter import (
     height_row,
     innovation,
     measurement_jacobian,
-    place_jacobian,
+    position_jacobian,
     remove_contact,
     squared_distance,
     update_covariance,
@@ -233,7 +233,7 @@ def measure_point(point: int, estimate: InvariantEstimate, scratch: InvariantScr
     scratch.vector[:] = scratch.centres[point] - jacobian @ scratch.offset_change
     scratch.world_point[:] = scratch.rotation @ scratch.vector
     offsets = estimate.covariance.shape[0] - estimate.encoder_offset.shape[0]
-    place_jacobian(scratch.world_jacobian, offsets, scratch.jacobian)
+    position_jacobian(scratch.world_jacobian, offsets, scratch.jacobian)
 
 
 @kernel

@@ -105,6 +105,7 @@ class PoseHistory(Signal):
     position = Field((LINE, 2), unit="m", text="places of the base by the estimator")
     heading = Field(LINE, unit="rad", text="headings of the base by the estimator")
     last = Field(dtype="int64", text="number of the last measurement that was used")
+    taken = Field(dtype="int64", text="tick in which it was taken")
     used = Field(dtype="int64", text="number of measurements used")
     offset = Field(2, unit="m", text="origin of the estimator's world in that of the measurements")
     turn = Field(unit="rad", text="its heading there")
@@ -116,7 +117,8 @@ class PoseCorrection(Block):
     The estimator's world lies at an offset t, turned by d about the vertical, in the measurements' world: p' = R_z(d) p + t. A measurement is
     compared with the estimate of its own time, and moves d and t by a share of what they differ by: one nth with the nth
     measurement, until that has fallen to ``gain``. So the estimator's fast motion is left as it is, and tilt and height are
-    its own. Without measurements t and d stay. One that is older than 256 ticks is left out.
+    its own. Without measurements t and d stay. One that is older than 256 ticks is left out, as is one that is
+    overtaken; a system that counts from the start again is used again.
     """
 
     class Params(Parameters):
@@ -151,8 +153,10 @@ class PoseCorrection(Block):
         history.heading[here] = yaw(state.orientation)
         taken = round(pose.time / clock.base_period)
         age = clock.tick - taken
-        if pose.number > history.last and 0 <= age < LINE:
-            history.last = pose.number
+        # A lower number that was taken later: the system has begun again. One taken before is late.
+        again = pose.number < history.last and taken > history.taken
+        if (pose.number > history.last or again) and 0 <= age < LINE:
+            history.last, history.taken = pose.number, taken
             history.used += 1
             then = taken % LINE
             share = max(params.gain, 1.0 / history.used)

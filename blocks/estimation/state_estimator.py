@@ -33,9 +33,9 @@ from .inertial_estimator import (
     is_unaccelerated,
     learn_bias,
     limit,
-    place_points,
     predict,
     publish,
+    set_point_positions,
 )
 
 _SHORTEST_LINE = 0.06
@@ -200,7 +200,7 @@ class StateEstimator(InertialEstimator):
                 correct_tilt_from_gravity(
                     estimate.orientation, scratch.force, constants.tilt_gain, scratch.vector
                 )
-        place_points(estimate, legs)
+        set_point_positions(estimate, legs)
         trusted, support = trust_points(estimate, trust, legs, params, constants, scratch)
         correct_motion(estimate, legs, params, constants, scratch, trusted, support)
         if trust.stepped:

@@ -27,7 +27,9 @@ from ...runtime.language.signals import Field, Signal
 class Quaternion(Signal):
     """A rotation as a unit quaternion."""
 
-    value = Field(4, unit="", text="x, y, z, w (Hamilton); takes body vectors to the world")
+    value = Field(
+        4, unit="", quaternion=True, text="x, y, z, w (Hamilton); takes body vectors to the world"
+    )
 
 
 class RotationMatrix(Signal):

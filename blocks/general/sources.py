@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from ...mathematics.elementary import expm1, log, sin
 from ...mathematics.kernel import kernel
+from ...mathematics.ticks import first_tick, in_ticks, since_begin
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Clock, Output
 from ...runtime.language.parameters import Parameters, ScalarOrVector, live_parameter, parameter
@@ -18,12 +19,6 @@ from .vectors import (
     Vector,
     VectorParameters,
 )
-
-
-@kernel
-def first_tick(seconds: float, base_period: float) -> int:
-    """Return the first tick that is not before an instant [s]; one that is meant to be on a tick is."""
-    return math.ceil(seconds / base_period - 1e-6)
 
 
 class Constant(UnitFromParameters, Block):
@@ -141,10 +136,12 @@ class Pulse(UnitFromParameters, Block):
     @kernel
     @staticmethod
     def step(y: Vector, params: Params, clock: Clock) -> None:
-        time = clock.base_period * clock.tick
-        periods = (time - params.start) / params.duration + 1e-9
+        now = float(clock.tick)
+        begin = in_ticks(params.start, clock.base_period)
+        length = in_ticks(params.duration, clock.base_period)
+        high = in_ticks(params.width * length, 1.0)
         y.value[:] = params.offset
-        if periods >= 0.0 and periods - math.floor(periods) < params.width:
+        if now >= begin and since_begin(now, begin, length) < high:
             y.value[:] += params.amplitude
 
 

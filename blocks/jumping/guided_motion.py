@@ -221,7 +221,7 @@ class GuidedBody:
         return np.asarray(jacobian[0:3] - skew @ jacobian[3:6])
 
     def _turning_rows(self, foot: int, turning: Array) -> Array:
-        """Those rows of a foot's angular velocity (3, n) in the world that contacts constrain."""
+        """Return the rows of a foot's angular velocity (3, n) in the world that contacts constrain."""
         kind, line = self._shapes[foot]
         if kind == FootKind.POINT:
             return turning[:0]

@@ -203,7 +203,9 @@ class JumpPlan(Block):
         try:
             scene = scene_of(task, context.robot)
         except JumpTaskError as error:
-            scene = UnmetRequirement(str(error), fix="robot.scene: flat, or a floor and boxes")
+            scene = UnmetRequirement(
+                str(error), fix="robot.ground.scene: flat, or a floor and boxes"
+            )
         end, hops = task.places()[-1], task.hops()
         velocity, momentum = None, None
         if {"velocity_correction", "momentum_correction"} & context.asked:

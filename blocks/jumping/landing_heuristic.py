@@ -17,7 +17,7 @@ from ...mathematics.landing_law import (
     apply_lead,
     heading_matrix,
     keep_within,
-    landing_place,
+    landing_position,
     lowest_height,
     retraction,
     swing,
@@ -281,7 +281,7 @@ class LandingHeuristic(Block):
             turn_places(constants.stance, yaw(memory.orientation), scratch.centre)
         for foot in range(constants.side.shape[0]):
             place, speed = scratch.place[foot], scratch.speed
-            choose_place(foot, params, constants, memory, feet.landing[foot], scratch)
+            choose_landing_position(foot, params, constants, memory, feet.landing[foot], scratch)
             speed[:] = reference.foot_velocity[foot] - reference.com_velocity
             if overdue:
                 speed[:] = 0.0
@@ -425,7 +425,7 @@ def fall_time(speed: float, height: float) -> float:
 
 
 @kernel
-def choose_place(
+def choose_landing_position(
     foot: int,
     params: LandingParams,
     constants: LandingConstants,
@@ -442,7 +442,7 @@ def choose_place(
         place[2] = planned[2] + shift[3]
         keep_within(params.p_max, scratch.centre[foot], planned, place)
         return
-    landing_place(
+    landing_position(
         planned, side, scratch.linear, scratch.angular, params.w_l, params.w_k,
         params.w_c, params.p_max, scratch.centre[foot], place,
     )  # fmt: skip

@@ -19,7 +19,7 @@ from ...mathematics.landing_law import (
     heading_matrix,
     map_flight,
     predict_tilt,
-    pull_to_place,
+    pull_to_position,
 )
 from ...mathematics.rotations import conjugate, from_matrix, logarithm, multiply
 from ...robots.description import RobotDescription
@@ -231,7 +231,7 @@ def choose_shift_of_feet(
     aside = constants.per_linear[1] * linear[1]
     cost.goal[1] = aside - constants.per_angular[1] * angular[0]
     cost.goal[2] = constants.apart * abs(linear[1])
-    pull_to_place(cost.goal, scratch.miss, params.place_gain, constants.place_range)
+    pull_to_position(cost.goal, scratch.miss, params.place_gain, constants.place_range)
     choose_shift(scratch.tilt, scratch.tilt_per_shift, cost, scratch.matrix, memory.shift)
 
 

@@ -13,7 +13,7 @@ from ...mathematics.kernel import kernel
 from ...mathematics.rotations import rotate, yaw
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet, fall_height
-from ...robots.limb import place_limb, read_limb
+from ...robots.limb import read_limb, set_limb_pose
 
 LOAD_SHARE = 0.4
 """Least load of a foot at rest, as a share of its load when all feet carry the same."""
@@ -160,7 +160,7 @@ def add_roll(
         for k in range(size):
             balls.angles[k] = joints[balls.joints[ball, k]]
         links, tip = balls.links[ball, :size], balls.tip[ball]
-        place_limb(links, tip, balls.angles, balls.anchors, balls.pose)
+        set_limb_pose(links, tip, balls.angles, balls.anchors, balls.pose)
         radius = 0.5 * balls.radius[ball]  # a rotation is half the sum of old x new axis
         for k in range(3):
             old, new = turned[foot, k], balls.axis

@@ -306,7 +306,7 @@ def record_flight(
             record.lift_off_speed = record.unloaded_speed
             record.lift_off_momentum[:] = record.unloaded_momentum
             if series.made != 0:
-                keep_place(series)
+                keep_position(series)
     elif record.touchdown_time == NEVER and loaded:
         record.touchdown_time = now - constants.period
         record.touchdown_speed = -record.vertical_speed
@@ -355,7 +355,7 @@ def record_row(
 ) -> None:
     """Between two jumps: where the feet stand, and whether another comes."""
     if constants.planned and any_loaded(truth.contact_touched):
-        compare_place(record, series)
+        compare_landing_position(record, series)
     landed = record.now - series.landed_time
     if record.lift_off_time == NEVER and landed >= params.rest_time - 1e-9:
         end_run(scratch, Ending.ALONE, landed)
@@ -407,7 +407,7 @@ def record_jump(
 
 
 @kernel
-def compare_place(record: JumpRecord, series: JumpSeries) -> None:
+def compare_landing_position(record: JumpRecord, series: JumpSeries) -> None:
     """Compare the feet with their planned positions and headings, between two jumps."""
     x, y, feet = 0.0, 0.0, record.foot.shape[0]
     for k in range(feet):
@@ -423,7 +423,7 @@ def compare_place(record: JumpRecord, series: JumpSeries) -> None:
 
 
 @kernel
-def keep_place(series: JumpSeries) -> None:
+def keep_position(series: JumpSeries) -> None:
     """Keep the last landing's error if it is the largest, when the next jump lifts off."""
     keep_worst(series.place_error, series.place_jump, series.place_now, series.made)
     keep_worst(series.turn_error, series.turn_jump, series.turn_now, series.made)

@@ -71,7 +71,6 @@ __all__ = [
     "MotorCondition",
     "Phase",
     "PhaseState",
-    "PlaceMeasurement",
     "PointTarget",
     "PoseMeasurement",
     "RobotHealth",

@@ -50,7 +50,9 @@ class BaseState(Signal):
     """The floating base: its pose and velocity."""
 
     position = Field(3, unit="m", frame="world", text="base origin")
-    orientation = Field(4, unit="", text="quaternion x, y, z, w from body to world")
+    orientation = Field(
+        4, unit="", quaternion=True, text="quaternion x, y, z, w from body to world"
+    )
     linear_velocity = Field(3, unit="m/s", frame="world", text="velocity of the base origin")
     angular_velocity = Field(3, unit="rad/s", frame="body", text="angular velocity of the base")
 
@@ -140,7 +142,7 @@ class WholeBodyTarget(Signal):
     com = Field(3, unit="m", frame="world", text="centre of mass")
     com_velocity = Field(3, unit="m/s", frame="world", text="its velocity")
     com_acceleration = Field(3, unit="m/s^2", frame="world", text="its feedforward acceleration")
-    orientation = Field(4, unit="", text="base quaternion x, y, z, w")
+    orientation = Field(4, unit="", quaternion=True, text="base quaternion x, y, z, w")
     angular_velocity = Field(3, unit="rad/s", frame="body", text="base angular velocity")
     angular_acceleration = Field(
         3, unit="rad/s^2", frame="body", text="its feedforward acceleration"

@@ -19,7 +19,7 @@ class JumpReference(Signal):
     com = Field(3, unit="m", frame="world", text="centre of mass")
     com_velocity = Field(3, unit="m/s", frame="world", text="its velocity")
     com_acceleration = Field(3, unit="m/s^2", frame="world", text="its acceleration")
-    orientation = Field(4, unit="", text="base quaternion x, y, z, w")
+    orientation = Field(4, unit="", quaternion=True, text="base quaternion x, y, z, w")
     angular_velocity = Field(3, unit="rad/s", frame="body", text="base angular velocity")
     angular_acceleration = Field(
         3, unit="rad/s^2", frame="body", text="its rate; zero if not known"

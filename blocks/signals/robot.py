@@ -169,7 +169,9 @@ class RobotTruth(Signal):
     tick."""
 
     base_position = Field(3, unit="m", frame="world", text="base origin")
-    base_orientation = Field(4, unit="", text="quaternion x, y, z, w from body to world")
+    base_orientation = Field(
+        4, unit="", quaternion=True, text="quaternion x, y, z, w from body to world"
+    )
     base_linear_velocity = Field(3, unit="m/s", frame="world", text="velocity of the base origin")
     base_angular_velocity = Field(3, unit="rad/s", frame="body", text="angular velocity")
     joint_position = Field("n_joints", unit="rad", text="joint angles")

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
     from rich.table import Table
 
-    from ...runtime.running.memory import BoundGraph
-
 
 SET_HELP = "Set a parameter: block.parameter=value. Repeatable."
 WIDE = 200
@@ -99,7 +97,7 @@ def print_warning(message: str) -> None:
     typer.echo(message, err=True)
 
 
-def print_place(error: RunError, *, traceback: bool) -> None:
+def print_location(error: RunError, *, traceback: bool) -> None:
     """Print, on standard error, where a block failed: the line, or the whole traceback."""
     if traceback and error.traceback:
         typer.echo(error.traceback, err=True)
@@ -128,31 +126,8 @@ def errors_reported(as_json: bool, *, traceback: bool = False) -> Iterator[None]
         else:
             print_error(str(error))
             if traceback and isinstance(error, RunError):
-                print_place(error, traceback=True)
+                print_location(error, traceback=True)
         raise typer.Exit(code) from error
-
-
-TICKS_A_STEP = 100
-"""Ticks between two updates of the bar: the control thread pays microseconds for each."""
-
-
-class TickCounter:
-    """A sink that moves a progress bar."""
-
-    def __init__(self, progress: Progress, task: TaskID) -> None:
-        self._progress = progress
-        self._task = task
-
-    def open(self, bound: BoundGraph) -> None:
-        """No-op: there is nothing to prepare."""
-
-    def record(self, tick: int) -> None:
-        """Move the bar now and then."""
-        if tick % TICKS_A_STEP == 0:
-            self._progress.update(self._task, completed=tick)
-
-    def close(self) -> None:
-        """No-op: there is nothing to finish."""
 
 
 @contextmanager

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 import typer
 
 from ...runtime.language.errors import ExitCode
-from ...runtime.running.memory import BoundGraph
 from ...runtime.running.run_result import RunResult
+from ...runtime.running.sink import Sink
 from .output import (
     number,
     print_error,
     print_json,
-    print_place,
+    print_location,
     print_warning,
     say,
     stopped_by_signals,
@@ -26,12 +26,13 @@ from .output import (
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Progress, TaskID
+    from rich.table import Table
 
     from ...logs.recording.recorder_link import RecorderLink
     from ...logs.viewing.viewer import Viewer
     from ...runtime.language.stages import CheckedGraph
     from ...runtime.running.real_time import RealTimeOptions
-    from ...runtime.running.sinks import Sink
     from ...studies.batch.seeds import SeedRow
 
 
@@ -101,8 +102,7 @@ def run_once(
     from ...logs.recording.recorder import Recorder
     from ...runtime.running.freeze_guard import FreezeGuard
     from ...runtime.running.real_time import NO_REAL_TIME
-    from .output import TickCounter, compiling_shown, progress_bar
-    from .viewing import how_to_view
+    from .output import compiling_shown, progress_bar
 
     name, record, as_json = graph.checked.name, options.record, options.as_json
     recorder = None
@@ -127,32 +127,75 @@ def run_once(
             )  # fmt: skip
     recording = recorder.recording if recorder is not None else None
     problem = recorder.problem if recorder is not None and record is not None else ""
-    code = code_with_recording(result.exit_code, problem)
-    print_result(out, name, result, times=options.times)
+    missing, about_files = "", []
     if recorder is not None and recording is not None:
         missing = f" ({recorder.missing} ticks are not in it)" if recorder.missing else ""
-        say(out, f"recording: {recording}{missing}; to see it: {how_to_view(recording)}")
         if recorder.files:
-            say(out, f"the recording is in {len(recorder.files)} files: "
-                f"{', '.join(file.name for file in recorder.files)}")  # fmt: skip
-        if recorder.before:
-            say(out, recorder.before)
-    for warning in (*result.block_warnings, *result.stop_problems):
+            names = ", ".join(file.name for file in recorder.files)
+            about_files.append(f"the recording is in {len(recorder.files)} files: {names}")
+        about_files += [recorder.before] if recorder.before else []
+    files = [str(file) for file in recorder.files] if recorder is not None else []
+    return report_run(
+        out, graph.checked, result, as_json=as_json, traceback=options.traceback,
+        times=options.times, recording=recording, missing=missing, about_files=about_files,
+        problem=problem, first=also or {},
+        last={"warnings": [*messages, *result.warnings], "files": files, **graph.about()},
+    )  # fmt: skip
+
+
+def report_run(
+    out: Console,
+    graph: CheckedGraph,
+    result: RunResult,
+    *,
+    as_json: bool,
+    traceback: bool,
+    recording: Path | None,
+    problem: str,
+    times: bool = True,
+    tables: Sequence[Table] = (),
+    missing: str = "",
+    about_files: Sequence[str] = (),
+    warnings: Sequence[str] = (),
+    first: Mapping[str, Any] = {},
+    last: Mapping[str, Any] = {},
+) -> ExitCode:
+    """Print the result of a run, in one process or on several machines, for people or as JSON.
+
+    Args:
+        recording: where the recording is, if there is one.
+        problem: what of the recording is missing, as an error; empty if nothing is.
+        times: whether the times of the blocks are printed.
+        tables: printed behind the metrics.
+        missing: behind the path of the recording.
+        about_files: lines behind that.
+        warnings: printed beside those of the blocks.
+        first: what the JSON object has before the result.
+        last: what it has behind the result, or in place of entries of it.
+
+    Returns:
+        The exit code.
+    """
+    from .viewing import how_to_view
+
+    code = code_with_recording(result.exit_code, problem)
+    print_result(out, graph.name, result, times=times)
+    for each in tables:
+        out.print(each)
+    if recording is not None:
+        say(out, f"recording: {recording}{missing}; to see it: {how_to_view(recording)}")
+    for line in about_files:
+        say(out, line)
+    for warning in (*result.block_warnings, *result.stop_problems, *warnings):
         print_warning(warning)
     if as_json:
-        shown = str(recording) if recording else None
-        overrides = dict(graph.checked.overrides)
-        warnings = [*messages, *result.warnings]
-        files = [str(file) for file in recorder.files] if recorder is not None else []
-        about = {**result.to_json(), "warnings": warnings, "recording": shown, "files": files}
-        about |= {"exit_code": int(code), "recording_problem": problem or None}
-        print_json(
-            {"graph": name, "overrides": overrides, **(also or {}), **about, **graph.about()}
-        )
+        about = {**result.to_json(), "recording": str(recording) if recording else None}
+        about |= {"exit_code": int(code), "recording_problem": problem or None, **last}
+        print_json({"graph": graph.name, "overrides": dict(graph.overrides), **first, **about})
     else:
         print_verdict(result)
         if result.error is not None:
-            print_place(result.error, traceback=options.traceback)
+            print_location(result.error, traceback=traceback)
     if problem:
         print_error(problem)
     return code
@@ -245,8 +288,8 @@ def print_result(out: Console, name: str, result: RunResult, *, times: bool = Tr
         f"{result.ticks} ticks, {result.duration_s:.3f} s of the graph in "
         f"{result.wall_time_s:.2f} s ({speed:.1f} x real time); run hash {result.run_hash}",
     )
-    if result.overruns:
-        say(out, f"{result.overruns} overruns, {result.skipped_periods} periods skipped")
+    if result.lateness is not None:
+        say(out, f"{result.lateness}; {result.skipped_periods} periods skipped")
 
 
 def print_verdict(result: RunResult) -> None:
@@ -263,7 +306,7 @@ def code_with_recording(code: ExitCode, problem: str) -> ExitCode:
     return ExitCode.NOT_RECORDED if problem and code is ExitCode.SUCCESS else code
 
 
-class CrashReporter:
+class CrashReporter(Sink):
     """A sink that prints the JSON object of an abandoned run; it records nothing.
 
     Args:
@@ -275,16 +318,24 @@ class CrashReporter:
         self._name = name
         self._as_json = as_json
 
-    def open(self, bound: BoundGraph) -> None:
-        """Prepare nothing."""
-
-    def record(self, tick: int) -> None:
-        """Record nothing."""
-
-    def close(self) -> None:
-        """Close nothing."""
-
     def abandoned(self, result: RunResult) -> None:
         """Print the result."""
         if self._as_json:
             print_json({"graph": self._name, **result.to_json()})
+
+
+TICKS_A_STEP = 100
+"""Ticks between two updates of the bar: the control thread pays microseconds for each."""
+
+
+class TickCounter(Sink):
+    """A sink that moves a progress bar."""
+
+    def __init__(self, progress: Progress, task: TaskID) -> None:
+        self._progress = progress
+        self._task = task
+
+    def record(self, tick: int) -> None:
+        """Move the bar now and then."""
+        if tick % TICKS_A_STEP == 0:
+            self._progress.update(self._task, completed=tick)

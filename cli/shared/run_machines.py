@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...files.names import inside
 from ...processes.child_process import ChildProcess
 from ...runtime.language.errors import AloftError, ExitCode, RunError
 from ...runtime.language.stages import CheckedGraph
@@ -27,26 +28,22 @@ from ...runtime.links.path_ages import NAME
 from ...runtime.live.part_feed import PartFeed
 from ...runtime.loading import checked_file
 from ...runtime.placement.placed import PlacedGraph, split_over_machines
-from ...runtime.running.memory import BoundGraph
+from ...runtime.running.lateness import TickLateness
 from ...runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
 from ...runtime.running.run_result import RunResult, merge_metrics
-from ...runtime.running.sinks import Sink
+from ...runtime.running.sink import Sink
 from ...runtime.running.timing import BlockTimes
 from ...runtime.transports.registry import network_transport, transport_type
 from .output import (
     number,
-    print_error,
-    print_json,
-    print_place,
-    print_warning,
-    say,
     table,
 )
-from .run_graph import code_with_recording, print_result, print_verdict
+from .run_graph import report_run
 from .running_graphs import registered
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
 
 
 GRACE = 15.0
@@ -80,12 +77,13 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
     """
     from ...logs.recording.merged_run import merge_recordings, path_metrics, read_parts, run_hash_of
     from ...logs.recording.output_file import cause_of, remedy
-    from .viewing import how_to_view
 
     placed = split_over_machines(checked_file(path, options.settings))
     graph = placed.graph
     with tempfile.TemporaryDirectory(prefix="aloft-parts-") as folder:
-        files = {machine.name: Path(folder) / f"{machine.name}.rrd" for machine in placed.machines}
+        files = {
+            machine.name: inside(Path(folder), f"{machine.name}.rrd") for machine in placed.machines
+        }
         part_reports = _run_processes(path, options, placed, files)
         parts = read_parts(placed, files) if all(f.exists() for f in files.values()) else {}
         run_hash, ticks = run_hash_of(placed, parts) if parts else ("", 0)
@@ -101,32 +99,16 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
             )
             try:
                 if parts:
-                    recording = merge_recordings(
-                        target, placed, BoundGraph(graph), parts, result.to_json()
-                    )
+                    recording = merge_recordings(target, placed, parts, result.to_json())
             except OSError as error:
                 why = error.strerror or error
                 problem = f"no whole recording: {target} cannot be written ({why})"
                 problem += f"; {remedy(cause_of(error), target)}"
-        code = code_with_recording(result.exit_code, problem)
-    print_result(out, graph.name, result)
-    _print_links(out, part_reports)
-    if recording is not None:
-        say(out, f"recording: {recording}; to see it: {how_to_view(recording)}")
-    for text in (*result.block_warnings, *result.stop_problems, *result.warnings):
-        print_warning(text)
-    if options.as_json:
-        overrides = dict(graph.overrides)
-        about = {**result.to_json(), "recording": str(recording) if recording else None}
-        about |= {"exit_code": int(code), "recording_problem": problem or None}
-        print_json({"graph": graph.name, "overrides": overrides, **about, "machines": part_reports})
-    else:
-        print_verdict(result)
-        if result.error is not None:
-            print_place(result.error, traceback=options.traceback)
-    if problem:
-        print_error(problem)
-    return code
+    return report_run(
+        out, graph, result, as_json=options.as_json, traceback=options.traceback,
+        recording=recording, problem=problem, tables=_link_tables(part_reports),
+        warnings=result.warnings, last={"machines": part_reports},
+    )  # fmt: skip
 
 
 def _run_processes(
@@ -256,6 +238,7 @@ def _whole_result(
         blocks=_times(graph, part_reports),
         overruns=sum(part.get("overruns", 0) for part in part_reports.values()),
         skipped_periods=sum(part.get("skipped_periods", 0) for part in part_reports.values()),
+        lateness=TickLateness.merged(part.get("lateness") for part in part_reports.values()),
         error=error,
         stop_problems=_collected(part_reports, "stop_problems"),
         block_warnings=_collected(part_reports, "block_warnings"),
@@ -316,8 +299,8 @@ def _error(data: Mapping[str, Any]) -> RunError:
     return error
 
 
-def _print_links(out: Console, part_reports: Mapping[str, Mapping[str, Any]]) -> None:
-    """Print one row for each link."""
+def _link_tables(part_reports: Mapping[str, Mapping[str, Any]]) -> list[Table]:
+    """Make a table with one row for each link, if there are any."""
     links = [link for part in part_reports.values() for link in part.get("links", ())]
     if any("age_p50_ms" in link for link in links):
         columns: tuple[str, ...] = (
@@ -332,8 +315,7 @@ def _print_links(out: Console, part_reports: Mapping[str, Mapping[str, Any]]) ->
         columns = ("link", ">messages", ">damaged", ">twice or late")
         keys = ("name", "received", "damaged", "surplus")
     rows = [tuple(number(link[key]) for key in keys) for link in links]
-    if rows:
-        out.print(table("links", columns, rows))
+    return [table("links", columns, rows)] if rows else []
 
 
 class MachineRun:

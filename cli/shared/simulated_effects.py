@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 from pydantic.fields import FieldInfo
 
@@ -17,9 +17,9 @@ from ...files.nodes import MapNode, plain
 from ...files.problems import Problems
 from ...files.validation import unit_of
 from ...hal.simulated import effects
-from ...hal.simulated.simulated_robot import SimulatorParameters
+from ...hal.simulated.parameters import SimulatorParameters
 from ...planner.library.library import shipped_folder
-from ...runtime.language.parameters import Parameters
+from ...runtime.language.parameters import Parameters, group_of
 
 TRIAL = "warm"
 """The trial whose sizes are shown: ``real``, and what it adds."""
@@ -43,15 +43,14 @@ def simulated_effects(trial: str = TRIAL) -> list[dict[str, Any]]:
     """
     settings = commented_settings(trial)
     rows, alone = [], []
-    for name, info in SimulatorParameters.model_fields.items():
-        group = _group(info)
-        if group is None and name in settings:
-            alone.append(_row("", name, info, settings))
-        elif group is not None:
-            off = info.default is None
-            rows += [
-                _row(name, each, inner, settings, off) for each, inner in group.model_fields.items()
-            ]
+    for place, owner, off in _groups(SimulatorParameters, "", False):
+        for name, info in owner.model_fields.items():
+            if group_of(info) is not None:
+                continue
+            if owner.__module__ == effects.__name__:
+                rows.append(_row(place, name, info, settings, off))
+            elif f"{place}.{name}" in settings or (not place and name in settings):
+                alone.append(_row(place, name, info, settings))
     return alone + rows
 
 
@@ -83,14 +82,15 @@ def _read(file: Path) -> dict[str, Setting]:
     return found
 
 
-def _group(info: FieldInfo) -> type[Parameters] | None:
-    """Return the model of a parameter that is a group of effects; ``None`` for all others."""
-    for kind in (info.annotation, *get_args(info.annotation)):
-        if not isinstance(kind, type) or kind.__module__ != effects.__name__:
-            continue
-        if issubclass(kind, Parameters):
-            return kind
-    return None
+def _groups(
+    owner: type[Parameters], place: str, off: bool
+) -> Iterator[tuple[str, type[Parameters], bool]]:
+    """Yield a model and the groups in it, with their paths, and whether they are left out by default."""
+    yield place, owner, off
+    for name, info in owner.model_fields.items():
+        group = group_of(info)
+        if group is not None:
+            yield from _groups(group, f"{place}.{name}".lstrip("."), off or info.default is None)
 
 
 def _row(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from aloft import Block, Input, Output, Parameters, parameter
-from aloft.blocks.general.supervision import StateName
+from aloft.blocks.general.state_machine import StateName
 from aloft.blocks.signals import CommandMode, JointCommand, JointState
 
 

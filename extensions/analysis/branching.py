@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from ...logs.replay.replay import Replayable, Replayed, ReplayError, replay
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.running.memory import BoundGraph, Snapshot
-from ...runtime.running.sinks import Sink
+from ...runtime.running.sink import Sink
 
 
 def snapshot_at(recorded: Replayable, tick: int) -> Snapshot:

@@ -7,14 +7,13 @@ and those that read it. Without a change it gives the same bytes as the runtime.
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
-from typing import Any
 
 import numpy as np
 
-from ...runtime.language.block import Block
 from ...runtime.language.errors import AloftError
 from ...runtime.language.schedule import phases
 from ...runtime.running.memory import BoundGraph, Snapshot
+from ...runtime.running.tick_calls import tick_calls
 from .coordinates import Coordinates
 
 
@@ -47,22 +46,26 @@ class Period:
     ) -> None:
         graph = bound.graph
         self.bound, self.inputs, self.outputs, self.held = bound, inputs, outputs, held
-        specs = [graph.block(path) for path in graph.order]
-        rates = [(spec.period_ticks, spec.offset_ticks) for spec in specs]
-        self._table = [[specs[k].path for k in active] for active in phases(rates)]
+        outputs_of, updates_of = tick_calls(graph, bound.blocks)
+        active = phases([(call.period, call.offset) for call in outputs_of])
+        self._table = [[outputs_of[k].path for k in phase] for phase in active]
         touched = [each.block for each in (*inputs, *outputs)]
         blocks = {p: b for p, b in bound.blocks.items() if only is None or p in only}
         self._blocks = blocks
         self._calls = [
             [
-                (path, _first_call(blocks[path]) if path in blocks else _nothing, path in touched)
-                for path in active if path in blocks or path in touched
+                (path, getattr(blocks[path], outputs_of[k].method) if path in blocks else _nothing, path in touched)
+                for k in phase if (path := outputs_of[k].path) in blocks or path in touched
             ]
-            for active in self._table
+            for phase in active
         ]  # fmt: skip
         self._updates = [
-            [(p, blocks[p].update) for p in active if p in blocks and type(blocks[p]).is_moore()]  # type: ignore[attr-defined]  # a Moore block
-            for active in self._table
+            [
+                (c.path, getattr(blocks[c.path], c.method))
+                for c in updates_of
+                if c.path in blocks and c.path in phase
+            ]
+            for phase in self._table
         ]
         self.ticks = len(self._table)
         self.start: Snapshot = bound.snapshot()
@@ -130,12 +133,6 @@ class Period:
                 elif self.held:
                     flat[each.places] = nominal[k]
                 flat[each.places] += displacement[k]
-
-
-def _first_call(block: Block) -> Callable[[], Any]:
-    """Return the call by which a block writes its outputs."""
-    call: Callable[[], Any] = block.emit if type(block).is_moore() else block.step  # type: ignore[attr-defined]  # it has the one or the other
-    return call
 
 
 def _nothing() -> None:

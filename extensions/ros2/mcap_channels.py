@@ -80,8 +80,8 @@ def _joint_codec(robot: RobotDescription) -> Codec:
 
 
 def _sensor_codec(message: RosMessage, frame: str) -> tuple[Codec, Mapping[str, str]]:
-    """The codec of a mounted sensor, whose numbers are in the axes of its link, and the names in the
-    message of its signal's fields."""
+    """Return the codec of a mounted sensor, whose numbers are in the axes of its link, and the
+    names in the message of its signal's fields."""
     fields = {field: path.replace(".", "_") for field, path in message.fields.items()}
     shown = _IMU_FIELDS if message.type == IMU_TYPE else tuple(fields.values())
     return _codec(message.type, {"frame_id": frame}, shown), fields
@@ -108,7 +108,7 @@ def _joints(port: str, codec: Codec, batch: RecordedRows) -> Iterator[Timed]:
 def _numbers(
     port: str, fields: Mapping[str, str], codec: Codec, batch: RecordedRows
 ) -> Iterator[Timed]:
-    """A message a tick with the ``fields`` of a port, each with its name in the message."""
+    """Yield a message a tick with the ``fields`` of a port, each with its name in the message."""
     values = {name: batch.signal(f"{port}.{field}") for field, name in fields.items()}
     rest = _NO_ORIENTATION if codec.type.name == IMU_TYPE else {}
     for k, instant in enumerate(_instants(batch)):
@@ -119,7 +119,7 @@ def _numbers(
 def _wrench(
     ports: ScenePorts, on_foot: list[bool], codec: Codec, batch: RecordedRows
 ) -> Iterator[Timed]:
-    """The force on a foot and its torque about the middle of the foot's contact points."""
+    """Yield the force on a foot and its torque about the middle of the foot's contact points."""
     assert ports.contact_force is not None and ports.contact_position is not None
     force = batch.signal(ports.contact_force)[:, on_foot]
     place = batch.signal(ports.contact_position)[:, on_foot]

@@ -81,7 +81,7 @@ class BulkExchange:
         self.plausible = np.array([[-1e30, 1e30]] * r)
         self.largest_step = np.full(r, np.inf)
         self.known = np.zeros(n, dtype=np.bool_)
-        """Which actuators have answered at all."""
+        """True for actuators that have answered at all, (n_actuators,)."""
 
     def exchange(self, reply_time: float | None = None) -> int:
         """Write the goals and read the registers; gives how many actuators answered.

@@ -108,9 +108,9 @@ class FieldErrors:
 
     def calls(self, true: Array, reading: Array) -> list[Call]:
         """Write the ``reading`` of a sample of ``true`` values, both (size,)."""
-        return [*self.drawing(), KernelCall(add_errors, true, self.arrays, reading)]
+        return [*self.draw_calls(), KernelCall(add_errors, true, self.arrays, reading)]
 
-    def drawing(self) -> list[Call]:
+    def draw_calls(self) -> list[Call]:
         """Draw the noise of a sample."""
         if self._noise_stream is None:
             return []

@@ -109,9 +109,9 @@ class Sensor(ABC):
             field: prod(each.resolve(dimensions or {}))
             for field, each in self.signal.fields.items()
         }
-        """How many numbers each field has."""
+        """Number of elements of each field."""
 
-    def reading(
+    def reading_calls(
         self, true: Mapping[str, Array], errors: Mapping[str, FieldErrors], out: Signal
     ) -> list[Call]:
         """Return the calls that write a sample to ``out``: the ``true`` value of every field, (n,), with its

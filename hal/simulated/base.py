@@ -87,11 +87,11 @@ class FixedBase:
     def refresh(self) -> None:
         """Bring ``angular_velocity`` up to date."""
 
-    def refreshing(self) -> list[KernelCall]:
+    def refresh_calls(self) -> list[KernelCall]:
         """Return the calls of ``refresh``."""
         return []
 
-    def publishing(self, truth: RobotTruth) -> KernelCall:
+    def publish_call(self, truth: RobotTruth) -> KernelCall:
         """Return the call that writes the base's pose and velocity."""
         return signal_call(report_fixed, truth)
 
@@ -129,11 +129,11 @@ class PlanarBase(FixedBase):
         """Bring ``angular_velocity`` up to date."""
         read_pitch_rate(self._data.qvel, self.angular_velocity)
 
-    def refreshing(self) -> list[KernelCall]:
+    def refresh_calls(self) -> list[KernelCall]:
         """Return the calls of ``refresh``."""
         return [KernelCall(read_pitch_rate, self._data.qvel, self.angular_velocity)]
 
-    def publishing(self, truth: RobotTruth) -> KernelCall:
+    def publish_call(self, truth: RobotTruth) -> KernelCall:
         """Return the call that writes the base's pose and velocity."""
         return signal_call(report_planar, self._data.qpos, self._data.qvel, truth)
 
@@ -171,7 +171,7 @@ class FloatingBase(FixedBase):
         """Move the base by ``offset`` [m, world]."""
         self._data.qpos[:3] += offset
 
-    def publishing(self, truth: RobotTruth) -> KernelCall:
+    def publish_call(self, truth: RobotTruth) -> KernelCall:
         """Return the call that writes the base's pose and velocity."""
         return signal_call(report_floating, self._data.qpos, self._data.qvel, truth)
 

@@ -12,13 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...blocks.signals import RobotHealth
 from ...mathematics.arrays import Array, Array1D
+from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.elementary import expm1
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.steps import signal_call
 from .drives import DriveTrain, MotorLimits, MotorScratch
+from .effect import Effect, StepViews
 from .effects import BatteryParameters
 from .state import PhysicsState
 from .windings import WarmMotors
@@ -88,7 +91,7 @@ def spread_voltage(voltage: Array1D, drives: Array1D) -> None:
     drives[:] = voltage[0]
 
 
-class Battery:
+class Battery(Effect):
     """The pack of a simulated robot.
 
     Args:
@@ -115,7 +118,7 @@ class Battery:
             *curves,
         )  # fmt: skip
 
-    def begin(self) -> None:
+    def begin(self, position: Array) -> None:
         """Begin with a pack that is full and has rested."""
         self._memory.battery[:] = [self._supply.open_voltage, 0.0, 0.0, 0.0]
 
@@ -125,10 +128,22 @@ class Battery:
         found: Array = self._memory.battery[:1]
         return found
 
-    def feeding(self, limits: MotorLimits) -> KernelCall:
+    def limit_calls(self, limits: MotorLimits) -> list[Call]:
+        """Set what the motors can do at the present voltage."""
+        return [self.limit_call(limits)]
+
+    def torque_calls(self, views: StepViews, limits: MotorLimits) -> list[Call]:
+        """Feed the motors."""
+        return [self.feed_call(limits)]
+
+    def limit_call(self, limits: MotorLimits) -> KernelCall:
+        """Return the call that sets what the motors can do at the present voltage."""
+        return signal_call(limit_by_voltage, self._pack, limits.motors, self._memory)
+
+    def feed_call(self, limits: MotorLimits) -> KernelCall:
         """Return the call that feeds the motors in a physics step."""
         return signal_call(draw_power, self._pack, limits.scratch, self._memory)
 
-    def limiting(self, limits: MotorLimits) -> KernelCall:
-        """Return the call that sets the motors' limits at the present voltage, before a physics step."""
-        return signal_call(limit_by_voltage, self._pack, limits.motors, self._memory)
+    def health_calls(self, health: RobotHealth) -> list[Call]:
+        """Write the pack's voltage [V] for all drives."""
+        return [KernelCall(spread_voltage, self.voltage, health.voltage)]

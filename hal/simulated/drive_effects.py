@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...mathematics.arrays import Array, Array1D, Array2D, Indices1D
+from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.elementary import expm1, sin, tanh
 from ...mathematics.kernel import kernel
@@ -29,9 +30,10 @@ from ...robots.transmission import PLAY_TIME, PLAY_TORQUE, SLIDING_SPEED
 from ...runtime.language.steps import signal_call
 from ..random_streams import Purpose, stream
 from ..sensors.noise import delay_sample
-from .effects import EncoderEffects, MotorEffects, WindingParameters
+from .drives import MotorLimits
+from .effect import Effect, StepViews
+from .effects import EncoderEffects, MotorEffects
 from .state import PhysicsState
-from .windings import Windings
 
 
 class EncoderModel(NamedTuple):
@@ -148,87 +150,123 @@ def produce_torque(
     torque[:] += scratch.joint
 
 
-class DriveEffects:
-    """The encoders and motors of a simulated robot.
+class EncoderDelays(Effect):
+    """The encoders of a simulated robot.
 
     Args:
         robot: the description.
-        encoders, motors: the sizes of the effects.
-        seed: draws what differs from motor to motor.
+        effects: the sizes of the effects.
+        seed: draws what differs from joint to joint.
         timestep: of the physics [s].
-        memory: of late readings, filters, current loops and windings.
-        windings: that warm; none: they do not.
+        memory: of late readings and filters.
     """
 
     def __init__(
-        self, robot: RobotDescription, encoders: EncoderEffects, motors: MotorEffects, seed: int,
-        timestep: float, memory: PhysicsState, windings: WindingParameters | None = None,
+        self, robot: RobotDescription, effects: EncoderEffects, seed: int, timestep: float,
+        memory: PhysicsState,
     ) -> None:  # fmt: skip
         n = len(robot.joints)
         self._memory, self._count = memory, n
-        self.has_encoders = encoders != EncoderEffects()
-        self.has_motors = motors != MotorEffects() or windings is not None
-        time = encoders.velocity_filter
-        turn = 2.0 * math.pi
-        self._encoders = EncoderModel(
-            np.full(n, round(encoders.delay / timestep)),
+        time = effects.velocity_filter
+        self._model = EncoderModel(
+            np.full(n, round(effects.delay / timestep)),
             -expm1(-timestep / time) if time > 0.0 else 1.0,
-            encoders.eccentricity, turn * stream(seed, Purpose.ECCENTRICITY).random(n),
-            encoders.compliance, 0.5 * encoders.backlash * robot.motors.gear_play, -expm1(-timestep / PLAY_TIME),
-        )  # fmt: skip
-        draws = stream(seed, Purpose.TORQUE_CONSTANT).uniform(-1.0, 1.0, n)
-        self.torque_constant = motors.torque_constant * (
-            1.0 + motors.torque_constant_spread * draws
-        )
-        """The factor on the torque constant of every motor at its nominal temperature, (n,)."""
-        self.windings = None
-        if windings is not None:
-            self.windings = Windings(windings, robot, self.torque_constant, timestep, memory)
-        constant = self.torque_constant if self.windings is None else self.windings.warm.constant
-        band = motors.current_bandwidth
-        self.lag = encoders.delay + time + (1.0 / (turn * band) if band is not None else 0.0)
-        """By how much [s] a drive's loop is late beside that of an ideal drive."""
-        limit = math.inf if motors.torque_limit is None else motors.torque_limit
-        self._motors = DrawnMotors(
-            np.ascontiguousarray(robot.joint_to_motor),
-            np.ascontiguousarray(robot.joint_to_motor.T), constant,
-            motors.saturation, np.array(robot.motors.peak_torque),
-            -expm1(-turn * band * timestep) if band is not None else 1.0, np.full(n, limit),
-            motors.ripple * robot.motors.peak_torque, motors.ripple_periods, turn * stream(seed, Purpose.RIPPLE).random(n),
-            motors.load_friction, motors.cogging * robot.motors.peak_torque, motors.cogging_periods,
-            turn * stream(seed, Purpose.COGGING).random(n),
+            effects.eccentricity, 2.0 * math.pi * stream(seed, Purpose.ECCENTRICITY).random(n),
+            effects.compliance, 0.5 * effects.backlash * robot.motors.gear_play, -expm1(-timestep / PLAY_TIME),
         )  # fmt: skip
 
     @staticmethod
     def dimensions(
-        robot: RobotDescription,
-        encoders: EncoderEffects,
-        motors: MotorEffects,
-        timestep: float,
-        windings: WindingParameters | None = None,
+        robot: RobotDescription, effects: EncoderEffects, timestep: float
     ) -> Mapping[str, int]:
         """Return the sizes of what is kept in ``PhysicsState``."""
-        n = len(robot.joints)
-        sensed = encoders != EncoderEffects()
+        late = effects != EncoderEffects()
         return {
-            "n_sensed_joints": n if sensed else 0,
-            "n_encoder_slots": round(encoders.delay / timestep) + 1 if sensed else 0,
-            "n_real_motors": n if motors != MotorEffects() or windings is not None else 0,
-            "n_windings": n if windings is not None else 0,
+            "n_sensed_joints": len(robot.joints) if late else 0,
+            "n_encoder_slots": round(effects.delay / timestep) + 1 if late else 0,
         }
 
-    def sensing(self, position: Array, velocity: Array, torque: Array) -> KernelCall:
+    def begin(self, position: Array) -> None:
+        """Take the first samples anew, without play."""
+        self._memory.encoder_taken[0] = 0
+        self._memory.encoder_play.fill(0.0)
+
+    def seen(self, views: StepViews) -> StepViews:
+        """Return the views with what the encoders read."""
+        memory = self._memory
+        return views._replace(angle=memory.encoder_position, speed=memory.encoder_velocity)
+
+    def reading_calls(self, views: StepViews) -> list[Call]:
+        """Read the encoders."""
+        return [self.sense_call(views.angle, views.speed, views.torque)]
+
+    def sense_call(self, position: Array, velocity: Array, torque: Array) -> KernelCall:
         """Return the call that reads the encoders after a physics step; arguments as for ``sense_joints``."""
         n = self._count
         scratch = EncoderScratch(np.zeros(n), np.zeros(n), np.zeros(1, np.int64))
         return signal_call(
-            sense_joints, position, velocity, torque, self._encoders, scratch, self._memory
+            sense_joints, position, velocity, torque, self._model, scratch, self._memory
         )
 
-    def producing(
+
+def drawn_constants(robot: RobotDescription, effects: MotorEffects, seed: int) -> Array:
+    """Draw the factor on the torque constant of every motor at its nominal temperature, (n_motors,)."""
+    draws = stream(seed, Purpose.TORQUE_CONSTANT).uniform(-1.0, 1.0, len(robot.joints))
+    return effects.torque_constant * (1.0 + effects.torque_constant_spread * draws)
+
+
+def drive_lag(encoders: EncoderEffects, motors: MotorEffects) -> float:
+    """Return by how much [s] a drive's loop is late beside that of an ideal drive."""
+    band = motors.current_bandwidth
+    loop = 1.0 / (2.0 * math.pi * band) if band is not None else 0.0
+    return encoders.delay + encoders.velocity_filter + loop
+
+
+class MotorLosses(Effect):
+    """The motors of a simulated robot.
+
+    Args:
+        robot: the description.
+        effects: the sizes of the effects.
+        seed: draws what differs from motor to motor.
+        timestep: of the physics [s].
+        memory: of the current loops.
+        constant: the factors on the torque constants as they are at any time, (n_joints,); by default those of
+            the nominal temperature.
+
+    Attributes:
+        torque_constant: these factors at the nominal temperature, (n_joints,).
+    """
+
+    def __init__(
+        self, robot: RobotDescription, effects: MotorEffects, seed: int, timestep: float,
+        memory: PhysicsState, constant: Array | None = None,
+    ) -> None:  # fmt: skip
+        n = len(robot.joints)
+        self._memory, self._count = memory, n
+        turn = 2.0 * math.pi
+        self.torque_constant = drawn_constants(robot, effects, seed)
+        band = effects.current_bandwidth
+        limit = math.inf if effects.torque_limit is None else effects.torque_limit
+        self._motors = DrawnMotors(
+            np.ascontiguousarray(robot.joint_to_motor),
+            np.ascontiguousarray(robot.joint_to_motor.T), self.torque_constant if constant is None else constant,
+            effects.saturation, np.array(robot.motors.peak_torque),
+            -expm1(-turn * band * timestep) if band is not None else 1.0, np.full(n, limit),
+            effects.ripple * robot.motors.peak_torque, effects.ripple_periods, turn * stream(seed, Purpose.RIPPLE).random(n),
+            effects.load_friction, effects.cogging * robot.motors.peak_torque, effects.cogging_periods,
+            turn * stream(seed, Purpose.COGGING).random(n),
+        )  # fmt: skip
+
+    def torque_calls(self, views: StepViews, limits: MotorLimits) -> list[Call]:
+        """Make of what is asked of the motors what they give."""
+        requested = limits.motor_torque
+        return [self.produce_call(views.position, views.turning, requested, views.torque)]
+
+    def produce_call(
         self, position: Array, velocity: Array, requested: Array, torque: Array
     ) -> KernelCall:
-        """Return the call that makes the motors' torque of the commanded one; arguments as for ``produce_torque``."""
+        """Return the call that makes of what is asked of the motors what they give; arguments as for ``produce_torque``."""
         scratch = ProducedTorque(*(np.zeros(self._count) for _ in ProducedTorque._fields))
         return signal_call(
             produce_torque, position, velocity, requested, self._motors, scratch, self._memory,
@@ -236,7 +274,7 @@ class DriveEffects:
         )  # fmt: skip
 
     def metrics(self) -> Mapping[str, float]:
-        """Return the weakest and the strongest motor."""
+        """Return the factors of the weakest and the strongest motor."""
         return {
             "robot_least_torque_constant": float(self.torque_constant.min()),
             "robot_largest_torque_constant": float(self.torque_constant.max()),

@@ -357,6 +357,6 @@ class SimulatedDrives:
         self._state.pending[()] = 0
         self._state.mode[int(self._state.active)] = CommandMode.DAMPING
 
-    def sending(self, command: JointCommand, step: Counts, latency: CommandLatency) -> KernelCall:
+    def send_call(self, command: JointCommand, step: Counts, latency: CommandLatency) -> KernelCall:
         """Return the call that sends a command in the physics step ``step``, a count without a dimension."""
         return signal_call(send_command, command, step, latency, self._state)

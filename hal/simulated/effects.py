@@ -1,7 +1,7 @@
 """Effects of a simulated robot beyond its description: the parameters of all of them.
 
 How each effect is computed stands in the file that uses its parameters: ``imu_effects.py``, ``drive_effects.py``,
-``gears.py``, ``battery.py``, ``windings.py``, ``switch_effects.py``, ``gantry.py``, ``joint_effects.py`` and ``variation.py``. A check of a graph needs none
+``gears.py``, ``battery.py``, ``windings.py``, ``switch_effects.py``, ``gantry.py``, ``stribeck.py`` and ``variation.py``. A check of a graph needs none
 of them. A *spread* is half the width of a uniform distribution around the nominal value, drawn by the seed.
 """
 

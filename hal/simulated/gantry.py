@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...mathematics.arrays import Array1D, Array2D, Counts, Indices0D, Vector3
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...robots.kinematics import standing_com
 from ...runtime.language.steps import signal_call
+from .effect import Effect
 from .effects import GantryParameters
 from .mujoco_model import body_name
 from .state import PhysicsState
@@ -99,7 +100,7 @@ def pull_rope(step: Indices0D, rope: Rope, base: Hanging, memory: PhysicsState) 
     wrench[5] += x * fy - y * fx
 
 
-class Gantry:
+class Gantry(Effect):
     """The rope of a simulated robot.
 
     Args:
@@ -129,7 +130,7 @@ class Gantry:
             params.height + 3.0 * params.stretch, params.slack, timestep,
         )  # fmt: skip
 
-    def begin(self) -> None:
+    def tie(self) -> None:
         """Tie the robot up where it is, with its weight on the rope."""
         base, rope, memory = self._base, self._rope, self._memory
         rope.anchor[:] = base.origin + product(base.rotation.reshape(3, 3), rope.tied)
@@ -152,6 +153,6 @@ class Gantry:
         self._memory.gantry[PAID_OUT] = min(self._memory.gantry[PAID_OUT], self._rope.drop)
         self._memory.gantry[GOAL], self._memory.gantry[DUE] = 0.0, NOT_DUE
 
-    def pulling(self, step: Counts) -> KernelCall:
-        """Return the call in which the rope pulls in the physics ``step``."""
-        return signal_call(pull_rope, step, self._rope, self._base, self._memory)
+    def force_calls(self, step: Counts, *, stands: bool) -> list[Call]:
+        """Let the rope pull."""
+        return [signal_call(pull_rope, step, self._rope, self._base, self._memory)]

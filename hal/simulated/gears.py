@@ -17,11 +17,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ...mathematics.arrays import Array, Array1D, Array2D
+from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_algebra import multiply_vector
 from ...robots.description import RobotDescription
 from ...runtime.language.steps import signal_call
+from .drives import MotorLimits
+from .effect import Effect, StepViews
 from .effects import GearParameters
 from .state import PhysicsState
 
@@ -90,7 +93,7 @@ def sense_rotors(
     multiply_vector(train.motion_to_joint, memory.rotor_speed, velocity)
 
 
-class YieldingGears:
+class YieldingGears(Effect):
     """The gears of a simulated robot.
 
     Args:
@@ -124,13 +127,30 @@ class YieldingGears:
         self._memory.rotor_angle[:] = self._train.to_motor @ position
         self._memory.rotor_speed[:] = 0.0
 
-    def turning(self, position: Array, velocity: Array, torque: Array) -> KernelCall:
+    def seen(self, views: StepViews) -> StepViews:
+        """Return the views with the rotors' motion for the encoders, which sit on them."""
+        angle, speed = self.position, self.velocity
+        return views._replace(angle=angle, speed=speed, turning=speed)
+
+    def torque_calls(self, views: StepViews, limits: MotorLimits) -> list[Call]:
+        """Turn the rotors, and pass on what the gears hold."""
+        return [self.turn_call(views.position, views.velocity, views.torque)]
+
+    def reading_calls(self, views: StepViews) -> list[Call]:
+        """Bring ``position`` and ``velocity`` up to date."""
+        return [self.sense_call()]
+
+    def restore_calls(self) -> list[Call]:
+        """Bring ``position`` and ``velocity`` up to date."""
+        return [self.sense_call()]
+
+    def turn_call(self, position: Array, velocity: Array, torque: Array) -> KernelCall:
         """Return the call that turns the rotors in a physics step; arguments as for ``turn_gears``."""
         scratch = GearScratch(*(np.zeros(len(self.position)) for _ in GearScratch._fields))
         return signal_call(
             turn_gears, position, velocity, self._train, scratch, self._memory, torque
         )
 
-    def sensing(self) -> KernelCall:
-        """Brings ``position`` and ``velocity`` up to date."""
+    def sense_call(self) -> KernelCall:
+        """Return the call that brings ``position`` and ``velocity`` up to date."""
         return signal_call(sense_rotors, self._train, self._memory, self.position, self.velocity)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...mathematics.arrays import Array, Array1D, Array2D, Indices1D, Vector3
+from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...mathematics.linear_systems import advance, second_order, settle
@@ -22,6 +23,7 @@ from ...mathematics.rotations import exponential, rotate_back
 from ...runtime.language.steps import signal_call
 from ..random_streams import Purpose, stream
 from ..sensors.noise import delay_sample
+from .effect import Effect, StepViews
 from .effects import ImuEffects
 from .state import PhysicsState
 
@@ -111,7 +113,7 @@ def pass_imu(
     )
 
 
-class ImuModel:
+class ImuModel(Effect):
     """The stages between the motion of the base and an IMU's readings.
 
     Args:
@@ -159,7 +161,19 @@ class ImuModel:
             "n_imu_axes": 0 if effects.ideal else _AXES,
         }
 
-    def sensing(self, rate: Array, force: Array) -> KernelCall:
+    def begin(self, position: Array) -> None:
+        """Take the first sample anew."""
+        self._memory.imu_taken[0] = 0
+
+    def seen(self, views: StepViews) -> StepViews:
+        """Return the views with what the unit reads."""
+        return views._replace(rate=self.rate, force=self.force)
+
+    def motion_calls(self, views: StepViews) -> list[Call]:
+        """Read the unit after a physics step."""
+        return [*views.base.refresh_calls(), self.read_call(views.rate, views.force)]
+
+    def read_call(self, rate: Array, force: Array) -> KernelCall:
         """Return the call that reads the unit after a physics step; arguments as for ``pass_imu``."""
         scratch = ImuScratch(np.zeros(3), np.zeros(_AXES))
         return signal_call(pass_imu, rate, force, self._chain, scratch, self._memory)

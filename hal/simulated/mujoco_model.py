@@ -36,10 +36,10 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...robots.description import Hull, RobotDescription
 from ...robots.kinematics import ball_feet, contact_centres
-from ...runtime.language.terrain import Ground, HeightField, Terrain
+from ...robots.terrain import Ground, HeightField, Terrain
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
-from .simulated_robot import SimulatorParameters
+from .parameters import SimulatorParameters
 from .thrusters import add_thrusters
 from .unsupported import shared_motors, unsupported_motor
 from .variation import Variation
@@ -155,7 +155,7 @@ def _surface(variation: Variation) -> dict[str, Any]:
 
 
 def _sole(variation: Variation) -> dict[str, Any]:
-    """Those of a contact point: rubber decides alone how soft its contacts are."""
+    """Return the settings of a contact point: rubber decides alone how soft its contacts are."""
     surface = _surface(variation)
     if variation.sole is not None:
         surface |= {"solref": list(variation.sole), "priority": 1}

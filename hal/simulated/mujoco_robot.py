@@ -16,7 +16,8 @@ from ...runtime.language.parameters import Parameters
 from ...runtime.language.signals import StateElements
 from ..drive_control import gain_requirements, lost_gains
 from .motor_feedback import FeedbackState, MotorFeedback
-from .simulated_robot import SimulatedRobot, SimulatorParameters, impossible_effects
+from .parameters import SimulatorParameters
+from .simulated_robot import SimulatedRobot, impossible_effects
 from .state import DriveState, TickRecord, integration_elements
 from .thrusters import SimulatedThrusters, ThrustQueue
 from .unsupported import uneven_contacts, unsupported_motor
@@ -34,7 +35,7 @@ class MujocoRobot(SimulatedRobot):
     one does. Meanwhile the drives close their loops at the physics rate by their own encoders, and
     limit the torques in motor space by the torque-speed curves.
 
-    With a ``bus_period`` they are the drives of a real robot: each closes a loop on its own motor, with
+    With an ``actuators.bus_period`` they are the drives of a real robot: each closes a loop on its own motor, with
     gains that are fixed for the run (``stiffness`` and ``damping`` of the joints, through the
     transmission), around goals that a driver renews when a command arrives and once a period, from the
     measurement of the exchange before. The command's gains are met at the instant of each measurement
@@ -62,9 +63,8 @@ class MujocoRobot(SimulatedRobot):
     one robot from that. Every disturbance has a stream of its own, so setting one to zero changes no
     other. Snapshots are exact: a restored run continues bit for bit.
 
-    A real robot differs from its description in what ``imu``, ``encoders``, ``motors``, ``gears``,
-    ``battery``, ``windings``, ``switches``, ``soles``, ``links``, ``joints``, ``cable`` and ``floor_tilt`` say; by default
-    in nothing. The trial ``graphs/trials/real.yaml`` has the usual sizes.
+    A real robot differs from its description in what the groups ``start``, ``ground``, ``body``, ``sensors`` and
+    ``actuators`` say; by default in nothing. The trial ``graphs/trials/real.yaml`` has the usual sizes.
 
     It does not model: contact of a limb with the torso or with itself, wind.
 
@@ -88,38 +88,45 @@ class MujocoRobot(SimulatedRobot):
     def example_parameters(cls) -> Mapping[str, Any]:
         """All disturbances at once that any robot bears, so that the conformance suite covers them."""
         return {
-            "gyro_noise": 0.02, "gyro_bias": 0.01, "gyro_range": 30.0,
-            "accelerometer_noise": 0.1, "accelerometer_bias": 0.1, "accelerometer_range": 160.0,
-            "encoder_offset": 0.003, "encoder_resolution": 1e-4, "joint_velocity_noise": 0.05,
-            "switch_threshold": [0.5, 3.0], "switch_bounce": 0.002, "latency": 0.002,
-            "jitter": 0.0005, "initial_attitude_error": 0.01, "random_start_phase": True,
-            "bus_period": 0.001, "floor_tilt": 0.01, "timestep": 0.00025,
-            "imu": {
-                "gyro_delay": 0.001, "accelerometer_delay": 0.002, "delay_spread": 0.0005,
-                "bandwidth": 100.0, "mount_frequency": 300.0, "position": [0.01, 0.0, 0.02],
-                "position_spread": 0.005, "rotation_spread": 0.01, "gyro_scale_spread": 0.01,
-                "accelerometer_scale_spread": 0.01, "acceleration_sensitivity": 1e-4,
+            "timestep": 0.00025, "latency": 0.002, "jitter": 0.0005,
+            "start": {"initial_attitude_error": 0.01, "random_start_phase": True},
+            "ground": {"floor_tilt": 0.01, "soles": {"time_constant": 0.006, "damping_ratio": 0.8}},
+            "body": {
+                "links": {
+                    "mass_spread": 0.05, "com_spread": 0.003, "inertia_spread": 0.1, "length_spread": 0.003,
+                },
+                "cable": {"pull": 0.004, "weight": 0.002},
             },
-            "encoders": {
-                "delay": 0.00025, "velocity_filter": 0.0005, "eccentricity": 0.002,
-                "compliance": 1e-5, "backlash": 0.2,
+            "sensors": {
+                "gyro_noise": 0.02, "gyro_bias": 0.01, "gyro_range": 30.0,
+                "accelerometer_noise": 0.1, "accelerometer_bias": 0.1, "accelerometer_range": 160.0,
+                "encoder_offset": 0.003, "encoder_resolution": 1e-4, "joint_velocity_noise": 0.05,
+                "switch_threshold": [0.5, 3.0], "switch_bounce": 0.002,
+                "imu": {
+                    "gyro_delay": 0.001, "accelerometer_delay": 0.002, "delay_spread": 0.0005,
+                    "bandwidth": 100.0, "mount_frequency": 300.0, "position": [0.01, 0.0, 0.02],
+                    "position_spread": 0.005, "rotation_spread": 0.01, "gyro_scale_spread": 0.01,
+                    "accelerometer_scale_spread": 0.01, "acceleration_sensitivity": 1e-4,
+                },
+                "encoders": {
+                    "delay": 0.00025, "velocity_filter": 0.0005, "eccentricity": 0.002,
+                    "compliance": 1e-5, "backlash": 0.2,
+                },
+                "switches": {"threshold": [0.04, 0.25], "debounce": 0.001, "sticking": 0.002},
             },
-            "motors": {
-                "torque_constant_spread": 0.05, "saturation": 0.1, "current_bandwidth": 300.0,
-                "torque_limit": 1000.0, "ripple": 0.005, "load_friction": 0.05, "cogging": 0.01,
+            "actuators": {
+                "bus_period": 0.001,
+                "joints": {
+                    "friction_spread": 0.2, "rotor_inertia": 1.1, "rotor_inertia_spread": 0.1,
+                    "static_friction": 1.2, "static_friction_spread": 0.3,
+                },
+                "motors": {
+                    "torque_constant_spread": 0.05, "saturation": 0.1, "current_bandwidth": 300.0,
+                    "torque_limit": 1000.0, "ripple": 0.005, "load_friction": 0.05, "cogging": 0.01,
+                },
+                "battery": {"resistance": 0.03},
+                "windings": {"temperature": 60.0, "heat_capacity": 15.0, "thermal_resistance": 5.0},
             },
-            "battery": {"resistance": 0.03},
-            "windings": {"temperature": 60.0, "heat_capacity": 15.0, "thermal_resistance": 5.0},
-            "links": {
-                "mass_spread": 0.05, "com_spread": 0.003, "inertia_spread": 0.1, "length_spread": 0.003,
-            },
-            "joints": {
-                "friction_spread": 0.2, "rotor_inertia": 1.1, "rotor_inertia_spread": 0.1,
-                "static_friction": 1.2, "static_friction_spread": 0.3,
-            },
-            "switches": {"threshold": [0.04, 0.25], "debounce": 0.001, "sticking": 0.002},
-            "soles": {"time_constant": 0.006, "damping_ratio": 0.8},
-            "cable": {"pull": 0.004, "weight": 0.002},
         }  # fmt: skip
 
     @classmethod
@@ -133,7 +140,7 @@ class MujocoRobot(SimulatedRobot):
             yield UnmetRequirement(
                 complaint, fix="correct `transmission` in the robot's description"
             )
-        elif params.bus_period is not None:
+        elif params.actuators.bus_period is not None:
             yield from gain_requirements(params, robot)
         uneven = uneven_contacts(robot) if robot.base_joint != "fixed" else ""
         if uneven:
@@ -142,7 +149,7 @@ class MujocoRobot(SimulatedRobot):
                 fix="correct `standing` or the positions under `contacts` in its description",
             )
         yield from impossible_effects(params, robot)
-        bus = params.bus_period
+        bus = params.actuators.bus_period
         whole = context.period if bus is None else bus
         what = "the control period" if bus is None else "bus_period"
         steps = whole / params.timestep
@@ -157,10 +164,10 @@ class MujocoRobot(SimulatedRobot):
         if bus is not None and not _is_whole(context.period / bus):
             yield UnmetRequirement(
                 f"bus_period {bus} s does not divide the control period {context.period} s",
-                parameter="bus_period",
+                parameter="actuators.bus_period",
                 expected=f"a whole fraction of {context.period} s",
                 found=f"{bus} s",
-                fix=f"bus_period: {_nearest_step(context.period, bus):.10g} s",
+                fix=f"actuators: {{bus_period: {_nearest_step(context.period, bus):.10g} s}}",
             )
 
     @classmethod
@@ -214,26 +221,26 @@ class MujocoRobot(SimulatedRobot):
         )  # fmt: skip
         steps = round(self.period / params.timestep)
         damping = RELEASED * plant.damping
-        if params.drive_damping is not None:
-            damping = np.full(len(robot.joints), params.drive_damping)
-        feedback = None
-        if params.bus_period is not None:
-            exchange = round(params.bus_period / params.timestep)
-            feedback = MotorFeedback(robot, params, params.bus_period, exchange, self.feedback)
+        if params.actuators.drive_damping is not None:
+            damping = np.full(len(robot.joints), params.actuators.drive_damping)
+        feedback, bus = None, params.actuators.bus_period
+        if bus is not None:
+            exchange = round(bus / params.timestep)
+            feedback = MotorFeedback(robot, params, bus, exchange, self.feedback)
         drives = self._drives = SimulatedDrives(robot, damping, self.drives, self.record, feedback)
         thrusters, following = None, list[Call]()
         if robot.thrusters:
             thrusters = SimulatedThrusters(
                 robot, plant.model, plant.data, self.drives, self.thrust_queue
             )
-            following.append(thrusters.following())
+            following.append(thrusters.follow_call())
         self._reading = CallSequence([
-            *plant.reading(self.imu, self.joints),
-            *plant.reading_switches(self.contacts.closed),
-            *plant.sensors.reading_mounted(self.mounted()),
-            *plant.truth.reporting(self.truth), self.reporting(),
-            *plant.reporting_drives(self.health),
-            *([thrusters.reading(self.thrusters)] if thrusters else []),
+            *plant.reading_calls(self.imu, self.joints),
+            *plant.switch_calls(self.contacts.closed),
+            *plant.sensors.mounted_calls(self.mounted()),
+            *plant.truth.report_calls(self.truth), self.report_call(),
+            *plant.health_calls(self.health),
+            *([thrusters.read_call(self.thrusters)] if thrusters else []),
         ])  # fmt: skip
         latency = self._latency = CommandLatency(
             np.zeros(1), float(params.jitter), np.zeros(1), params.timestep
@@ -241,12 +248,12 @@ class MujocoRobot(SimulatedRobot):
         jitter, _ = uniform_call(plant.streams[Purpose.JITTER], latency.draw)
         self._sending = CallSequence([
             *([jitter] if params.jitter else []),
-            drives.sending(self.command, self.physics.step, latency),
-            *([thrusters.sending(self.thrust)] if thrusters else []),
+            drives.send_call(self.command, self.physics.step, latency),
+            *([thrusters.send_call(self.thrust)] if thrusters else []),
         ])  # fmt: skip
-        self._settling = plant.simulating(drives, 1, thrusters=following)
-        self._ticking = plant.simulating(drives, steps, self.push, following)
-        self._damped = plant.simulating(drives, steps, thrusters=following)
+        self._settling = plant.simulation(drives, 1, thrusters=following)
+        self._ticking = plant.simulation(drives, steps, self.push, following)
+        self._damped = plant.simulation(drives, steps, thrusters=following)
 
     @property
     def calls(self) -> Mapping[str, Sequence[Call]]:
@@ -254,7 +261,7 @@ class MujocoRobot(SimulatedRobot):
         next tick."""
         return {
             "read": self._reading.calls, "send": self._sending.calls,
-            "clear": (self.plant.clearing,), "advance": self._ticking.calls,
+            "clear": (self.plant.clear_call,), "advance": self._ticking.calls,
         }  # fmt: skip
 
     def open(self) -> None:
@@ -304,9 +311,11 @@ class MujocoRobot(SimulatedRobot):
         return {"physics.integration": integration_elements(self.plant.model)}
 
     def metrics(self) -> Mapping[str, Metric]:
-        """The values that were drawn from the seed, and what the drives do not give of the gains."""
-        lost = lost_gains(self.params, self.robot) if self.params.bus_period is not None else {}
-        return {**self.plant.metrics(), **lost}
+        """Return the values that were drawn from the seed, and what the drives do not give of the gains."""
+        found = self.plant.metrics()
+        if self.params.actuators.bus_period is None:
+            return found
+        return {**found, **lost_gains(self.params, self.robot)}
 
 
 def _is_whole(ratio: float) -> bool:

@@ -6,58 +6,48 @@ owner of a plant gives the torques of its drives, and lets it simulate so many p
 
 from __future__ import annotations
 
-import ctypes
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cache, partial
-from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
 from ...blocks.signals import ExternalForce, ImuReading, JointState, RobotHealth
 from ...mathematics.arrays import (
     Array,
-    Array1D,
-    Array2D,
     Flags,
-    Flags1D,
     Indices,
-    Indices0D,
-    Indices1D,
-    Vector3,
 )
 from ...mathematics.compiling.call_sequence import Call, CallSequence
-from ...mathematics.compiling.foreign_call import ForeignCall, address_of
+from ...mathematics.compiling.foreign_call import ForeignCall
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Metric
 from ...runtime.language.steps import signal_call
-from ..drive_control import correcting
+from ..drive_control import correction_calls
 from ..random_streams import Purpose, RandomStreams, stream
 from ..sensors.sensor import mounted_sensors
 from .base import BASES
-from .battery import Battery, spread_voltage
+from .battery import Battery
+from .chosen_effects import chosen_effects, effect_dimensions
 from .contact_bias import ContactBias
-from .drive_effects import DriveEffects
+from .drive_effects import drive_lag
 from .drives import MotorLimits
-from .effects import SwitchEffects
+from .effect import Effect, StepViews
+from .external_forces import ExternalForces
 from .gantry import Gantry
-from .gears import YieldingGears
-from .imu_effects import ImuModel
-from .joint_effects import falling_friction
 from .mujoco_model import body_name, build_world, number_of_soles
+from .parameters import SimulatorParameters
+from .physics_step import step_calls
 from .sensors import SimulatedSensors
-from .simulated_robot import SimulatorParameters
 from .stance import (
     StartCheck,
     centre_on_origin,
     holding_gains,
     holding_torque,
     passive_joints,
-    place_standing,
+    set_standing_pose,
 )
 from .state import (
     PhysicsState,
@@ -69,134 +59,15 @@ from .state import (
     read_encoders,
     record_step,
 )
-from .switch_effects import SwitchDelays
 from .truth import TruthReport
-from .variation import Variation, draw_pull, draw_variation
-from .windings import NOMINAL, read_temperatures
+from .variation import Variation, draw_variation
+from .windings import NOMINAL, Windings
 
 if TYPE_CHECKING:
-    from mujoco import MjData, MjModel
+    from mujoco import MjData
 
 
-class PushPoints(NamedTuple):
-    """The points that a force may act at, in the simulator's memory.
-
-    ``sites`` and ``bodies`` (n_points,) are the numbers of the points and of their bodies, ``places``
-    and ``centres`` (n, 3) [m, world] where all points and all bodies' centres of mass are, ``wrenches``
-    (n, 6) [N, N m, world] what acts on all bodies. ``missing`` (1,) becomes true where a force acts at
-    a point that there is not.
-    """
-
-    sites: Indices1D
-    bodies: Indices1D
-    places: Array2D
-    centres: Array2D
-    wrenches: Array2D
-    missing: Flags1D
-
-
-@kernel
-def clear_wrenches(wrenches: Array2D) -> None:
-    """Nothing acts on any body."""
-    wrenches[:, :] = 0.0
-
-
-@kernel
-def apply_push(force: Array1D, point: Indices0D, points: PushPoints) -> None:
-    """Let the ``force`` (3,) [N, world] act at the ``point``, without a dimension, of its body, which
-    moves with the body."""
-    fx, fy, fz = force[0], force[1], force[2]
-    if fx == 0.0 and fy == 0.0 and fz == 0.0:
-        return
-    number = point[()]
-    if number < 0 or number >= points.sites.shape[0]:
-        points.missing[0] = True
-        return
-    site, body = points.sites[number], points.bodies[number]
-    x = points.places[site, 0] - points.centres[body, 0]
-    y = points.places[site, 1] - points.centres[body, 1]
-    z = points.places[site, 2] - points.centres[body, 2]
-    wrench = points.wrenches
-    wrench[body, 0], wrench[body, 1], wrench[body, 2] = fx, fy, fz
-    wrench[body, 3], wrench[body, 4] = y * fz - z * fy, z * fx - x * fz
-    wrench[body, 5] = x * fy - y * fx
-
-
-@kernel
-def add_force(force: Vector3, total: Vector3) -> None:
-    """Add a ``force`` [N, world] to what acts on the centre of mass of a body."""
-    total[:] += force
-
-
-class ExternalForces:
-    """Lets forces act on the robot's named points."""
-
-    def __init__(self, model: MjModel, data: MjData, robot: RobotDescription) -> None:
-        self._robot = robot
-        self._base = int(model.body(body_name(robot.base)).id)
-        sites = [int(model.site(f"point/{name}").id) for name in robot.points]
-        bodies = [int(model.body(body_name(link)).id) for link, _ in robot.points.values()]
-        self._points = PushPoints(
-            np.array(sites, np.int64), np.array(bodies, np.int64), data.site_xpos, data.xipos,
-            data.xfrc_applied, np.zeros(1, np.bool_),
-        )  # fmt: skip
-
-    def releasing(self) -> KernelCall:
-        """Nothing acts any more."""
-        return KernelCall(clear_wrenches, self._points.wrenches)
-
-    def pushing(self, push: ExternalForce) -> KernelCall:
-        """The push acts in the next physics step; ``check`` says whether it has a point."""
-        return KernelCall(apply_push, push.force, push.point, self._points)
-
-    def pulling(self, params: SimulatorParameters) -> list[Call]:
-        """In every physics step, what a cable does: the first call goes before that of a push, which
-        it makes begin anew, the second after it."""
-        assert params.cable is not None
-        base = self._points.wrenches[self._base, :3]
-        force = np.array(draw_pull(params.cable, params.seed, self._robot))
-        return [self.releasing(), KernelCall(add_force, force, base)]
-
-    def check(self, push: ExternalForce) -> None:
-        """Raise ``IndexError`` if the push has acted at a point that the robot does not have."""
-        if self._points.missing[0]:
-            self._points.missing[0] = False
-            raise IndexError(
-                f"push at point {int(push.point)}; {self._robot.name} has "
-                f"{len(self._points.sites)}: " + ", ".join(self._robot.points)
-            )
-
-
-def step_calls(model: MjModel, data: MjData) -> tuple[ForeignCall, ForeignCall]:
-    """The two parts of a physics step: what follows from the state, and the step with the present controls. ``model``
-    and ``data`` must stay alive.
-
-    Machine code and Python call the same two functions, so the bytes are the same. An error that is fatal to the
-    simulator, such as no memory left for contacts, ends the process in machine code, and is an exception in Python.
-    Of the simulator's memory a jump uses less than a hundredth.
-    """
-    import mujoco
-
-    first, second = _addresses()
-    memory = model._address, data._address
-    return (
-        ForeignCall(partial(mujoco.mj_step1, model, data), first, *memory),
-        ForeignCall(partial(mujoco.mj_step2, model, data), second, *memory),
-    )
-
-
-@cache
-def _addresses() -> tuple[int, int]:
-    """Of ``mj_step1`` and ``mj_step2`` in the library that Python has loaded; zeros where it is not found."""
-    import mujoco
-
-    folder, version = Path(mujoco.__file__).parent, mujoco.mj_versionString()
-    for name in (f"libmujoco.so.{version}", f"libmujoco.{version}.dylib"):
-        if (folder / name).is_file():
-            library = ctypes.CDLL(str(folder / name))
-            return address_of(library.mj_step1), address_of(library.mj_step2)
-    return 0, 0
-
+Kind = TypeVar("Kind", bound=Effect)
 
 SETTLING_TIME, OBSERVED_TIME = 0.3, 0.02
 """Time for which a robot settles before the check that it stands, and the last part of it, in which the load is
@@ -239,8 +110,8 @@ class Plant:
         sensors: what makes readings of the true motion.
         stiffness, damping: the gains [N m/rad, N m s/rad] (n_joints,) that hold the standing pose.
         position, velocity: the true joint motion [rad, rad/s], views of the simulator's memory.
-        sensed: what the encoders make of both, without their offsets.
-        clearing: begins a new record, except for the memory of the switches.
+        effects: what is not ideal, in the order in which a physics step has it.
+        clear_call: begins a new record, except for the memory of the switches.
         forces: what acts on the robot from outside.
         step1, step2: the two parts of a physics step, see ``step_calls``.
         late: delay [s] of the physics steps after the control clock's ticks.
@@ -265,32 +136,15 @@ class Plant:
         self.streams = RandomStreams(params.seed_of_noise, _noisy_fields(robot))
         self.sensors = SimulatedSensors(robot, params, self.streams, sensed)
         self._samples_per_tick = samples_per_tick
-        self.imu = None
-        if not params.imu.ideal:
-            self.imu = ImuModel(params.imu, params.seed, params.timestep, physics)
-        self.drives = DriveEffects(
-            robot, params.encoders, params.motors, params.seed, params.timestep, physics,
-            params.windings,
-        )  # fmt: skip
-        self.windings, self.battery = self.drives.windings, None
-        if params.battery is not None:
-            warm = None if self.windings is None else self.windings.warm
-            self.battery = Battery(params.battery, robot, params.timestep, physics, warm)
-        self.switches = None
-        if params.switches != SwitchEffects():
-            self.switches = SwitchDelays(params.switches, params.timestep, physics)
-        self.gears = None
-        if params.gears is not None:
-            rotors = self.variation.rotors(robot)
-            self.gears = YieldingGears(params.gears, robot, rotors, params.timestep, physics)
         whole = self.model
-        if params.gears is not None:
+        if params.actuators.gears is not None:
             whole = build_world(params, robot, replace(self.variation, rotor_share=1.0))
-        self.stiffness, self.damping = holding_gains(whole, robot, self.drives.lag)
+        lag = drive_lag(params.sensors.encoders, params.actuators.motors)
+        self.stiffness, self.damping = holding_gains(whole, robot, lag)
         self._passive = passive_joints(robot)
         self._limits = (robot.joint_limits[:, 0].copy(), robot.joint_limits[:, 1].copy())
         self._encoder = np.zeros(len(robot.joints))
-        self.clearing = signal_call(clear, record)
+        self.clear_call = signal_call(clear, record)
         self.start_delay = 0.0
         self._attach(mujoco.MjData(self.model))
 
@@ -305,14 +159,7 @@ class Plant:
             "n_integration": mujoco.mj_stateSize(model, everything),
             "n_random": RandomStreams(params.seed_of_noise, _noisy_fields(robot)).words,
             **SimulatedSensors.dimensions(params, mounted_sensors(robot)),
-            **ImuModel.dimensions(params.imu, params.timestep),
-            **DriveEffects.dimensions(
-                robot, params.encoders, params.motors, params.timestep, params.windings
-            ),
-            "n_rotors": 0 if params.gears is None else len(robot.joints),
-            "n_gantry": 0 if params.gantry is None else 4,
-            "n_battery": 0 if params.battery is None else 4,
-            "n_late_switches": 0 if params.switches == SwitchEffects() else len(robot.contacts),
+            **effect_dimensions(params, robot),
         }
 
     def _attach(self, data: MjData) -> None:
@@ -330,47 +177,47 @@ class Plant:
         self.truth = TruthReport(
             data, base, self._robot, self._params.build_scene(self._robot), self.record
         )
-        sensors, physics = self.sensors, self.physics
-        self._torque = data.ctrl[: len(self._robot.joints)]  # those of thrusters follow
-        force, contacts = data.sensor("accelerometer").data, data.sensor("contacts").data
-        self._rate = base.angular_velocity
-        self._sensing: list[Call] = []
-        if self.imu is not None:
-            self._sensing += [*base.refreshing(), self.imu.sensing(self._rate, force)]
-            self._rate, force = self.imu.rate, self.imu.force
-        self.sensed = self.position, self.velocity
-        self._seeing: list[Call] = []
-        if self.switches is not None:
-            self._seeing.append(self.switches.settling(self.record.closed))
-        if self.gears is not None:
-            self._seeing.append(self.gears.sensing())
-            self.sensed = self.gears.position, self.gears.velocity
-        self._turning = self.sensed[1]  # at what speed the motors turn, as joints
-        if self.drives.has_encoders:
-            self._seeing.append(self.drives.sensing(*self.sensed, self._torque))
-            self.sensed = physics.encoder_position, physics.encoder_velocity
-        self._note = signal_call(
-            record_step, self.physics.step, StepSensors(load, soles, force, contacts, self.position),
-            *self._limits, sensors.ground_force, sensors.bounce_steps, self.record,
+        joints = len(self._robot.joints)
+        views = StepViews(
+            base, self.position, self.velocity, data.ctrl[:joints],  # those of thrusters follow
+            self.position, self.velocity, self.velocity, base.angular_velocity,
+            data.sensor("accelerometer").data, self.record.closed,
         )  # fmt: skip
-        self._encoding = KernelCall(
-            read_encoders, self.sensed[0], sensors.encoder_offset, self._encoder
+        self.effects = chosen_effects(
+            self._params, self._robot, self.variation, model, data, base, self.physics
+        )
+        self._motion_calls: list[Call] = []
+        self._model_calls: list[Call] = []
+        self._reading_calls: list[Call] = []
+        for effect in self.effects:
+            self._motion_calls += effect.motion_calls(views)
+            self._model_calls += effect.model_calls(views)
+            self._reading_calls += effect.reading_calls(views)
+            views = effect.seen(views)
+        self._views = views
+        seen = StepSensors(load, soles, views.force, data.sensor("contacts").data, self.position)
+        self._record_call = signal_call(
+            record_step, self.physics.step, seen, *self._limits, self.sensors.ground_force,
+            self.sensors.bounce_steps, self.record,
+        )  # fmt: skip
+        self._encoder_call = KernelCall(
+            read_encoders, views.angle, self.sensors.encoder_offset, self._encoder
         )
         self.step1, self.step2 = step_calls(model, data)
-        if self._params.contact_bias:
+        if self._params.ground.contact_bias:
             self.step1 = ForeignCall(ContactBias(model, data).begin_step, 0)
-        self._falling: list[Call] = []
-        if self.variation.static_friction:
-            self._falling.append(falling_friction(
-                self.velocity, model.dof_frictionloss[base.velocities :],
-                self.variation.static_friction, self._params.joints.stribeck_velocity,
-            ))  # fmt: skip
         self.forces = ExternalForces(model, data, self._robot)
-        self.gantry = None
-        if self._params.gantry is not None and base.velocities:
-            self.gantry = Gantry(
-                self._params.gantry, self._robot, model, data, physics, self._params.timestep
-            )
+        self.gantry = self._effect(Gantry)
+        self.battery, self.windings = self._effect(Battery), self._effect(Windings)
+
+    def _effect(self, kind: type[Kind]) -> Kind | None:
+        """Return the effect of a kind; ``None`` if there is none."""
+        return next((effect for effect in self.effects if isinstance(effect, kind)), None)
+
+    @property
+    def sensed(self) -> tuple[Array, Array]:
+        """The encoders' reading of the joint motion [rad, rad/s], without their offsets."""
+        return self._views.angle, self._views.speed
 
     def stand(self, step: CallSequence, hold: Callable[[Array, Array], None]) -> None:
         """Stand on the ground and settle, up to the first instant of the control clock.
@@ -390,21 +237,24 @@ class Plant:
         attitude = stream(params.seed_of_noise, Purpose.ATTITUDE).standard_normal(3)
         mujoco.mj_resetData(self.model, self.data)
         model, data, base, robot = self.model, self.data, self._base, self._robot
-        tilt, level = attitude * params.initial_attitude_error, bool(self.variation.link_length)
+        tilt, level = (
+            attitude * params.start.initial_attitude_error,
+            bool(self.variation.link_length),
+        )
         normal = self._params.build_scene(robot).normal(0.0, 0.0)
-        place_standing(model, data, base, robot, tilt, level, normal)
-        if self.gantry is not None and params.gantry is not None:
-            base.shift(np.array([0.0, 0.0, params.gantry.height]))
+        set_standing_pose(model, data, base, robot, tilt, level, normal)
+        if self.gantry is not None and params.start.gantry is not None:
+            base.shift(np.array([0.0, 0.0, params.start.gantry.height]))
             mujoco.mj_kinematics(model, data)
-            self.gantry.begin()
+            self.gantry.tie()
         rotation = data.body(body_name(robot.base)).xmat.reshape(3, 3).copy()
         pose = self.position.copy()
-        self._begin_sensing()
+        self._begin_effects()
         hangs = self.gantry is not None
         torque = holding_torque(model, data, base, robot, hangs)
         hold(self.position + self.sensors.encoder_offset, torque)
         phase = 0.0
-        if params.random_start_phase:
+        if params.start.random_start_phase:
             phase = float(stream(params.seed_of_noise, Purpose.START_PHASE).random()) * self._period
         early = math.floor(phase / params.timestep)
         self.start_delay = phase - early * params.timestep
@@ -429,20 +279,12 @@ class Plant:
         if self.gantry is not None:
             self.gantry.lower(self.physics.step)
 
-    def _begin_sensing(self) -> None:
-        """Let encoders and IMU begin anew."""
-        self.physics.encoder_taken[0] = self.physics.imu_taken[0] = 0
-        self.physics.encoder_play.fill(0.0)
-        if self.battery is not None:
-            self.battery.begin()
-        if self.windings is not None:
-            self.windings.begin()
-        if self.gears is not None:
-            self.gears.begin(self.position)
-        if self.switches is not None:
-            self.switches.begin()
+    def _begin_effects(self) -> None:
+        """Let all effects begin anew, and read the pose."""
+        for effect in self.effects:
+            effect.begin(self.position)
         self.step1.run()
-        for call in self._seeing:
+        for call in self._reading_calls:
             call.run()
 
     def _settle(self, step: CallSequence, steps: int) -> None:
@@ -455,7 +297,7 @@ class Plant:
                 self.velocity[self._passive] = 0.0
                 self.step1.run()
 
-    def simulating(
+    def simulation(
         self, drives: JointTorques, steps: int, push: ExternalForce | None = None,
         thrusters: Sequence[Call] = (),
     ) -> CallSequence:  # fmt: skip
@@ -464,40 +306,24 @@ class Plant:
         ``push`` is a force from outside, held for all these steps; see ``forces.check``. With it the cable
         pulls, too: it is put on when the robot stands. ``thrusters`` are what those do in every step.
         """
-        step, torque, turning = self.physics.step, self._torque, self._turning
-        feeds = [each for each in (self.windings, self.battery) if each is not None]
+        step, views, limits = self.physics.step, self._views, drives.limits
+        stands = push is not None
+        added = [c for each in self.effects for c in each.force_calls(step, stands=stands)]
         one: list[Call] = [
-            self._encoding,
-            *(each.limiting(drives.limits) for each in feeds),
-            drives.torque_call(step, self._encoder, self.sensed[1], turning, torque),
+            self._encoder_call,
+            *(c for each in self.effects for c in each.limit_calls(limits)),
+            drives.torque_call(step, self._encoder, views.speed, views.turning, views.torque),
             *thrusters,
-        ]
-        if self.windings is not None:
-            one.append(self.windings.heating(drives.limits))
-        if self.battery is not None:
-            one.append(self.battery.feeding(drives.limits))
-        if self.drives.has_motors:
-            requested = drives.limits.motor_torque
-            one.append(self.drives.producing(self.position, turning, requested, torque))
-        if self.gears is not None:
-            one.append(self.gears.turning(self.position, self.velocity, torque))
-        if self.gantry is not None:
-            one.append(self.forces.releasing())
-        if push is not None and self._params.cable is not None:
-            release, pull = self.forces.pulling(self._params)
-            one += [release, self.forces.pushing(push), pull]
-        elif push is not None:
-            one.append(self.forces.pushing(push))
-        if self.gantry is not None:
-            one.append(self.gantry.pulling(step))
-        one += [
-            self.step2, *self._sensing, self._note, *self.sensors.after_step(), *self._falling,
-            self.step1,
-            *self._seeing,
+            *(c for each in self.effects for c in each.torque_calls(views, limits)),
+            *([self.forces.release_call()] if added else []),
+            *([] if push is None else [self.forces.push_call(push)]),
+            *added,
+            self.step2, *self._motion_calls, self._record_call, *self.sensors.after_step_calls(),
+            *self._model_calls, self.step1, *self._reading_calls,
         ]  # fmt: skip
-        return CallSequence([self.forces.releasing(), *(one * steps)])
+        return CallSequence([self.forces.release_call(), *(one * steps)])
 
-    def reading(self, imu: ImuReading, joints: JointState) -> list[Call]:
+    def reading_calls(self, imu: ImuReading, joints: JointState) -> list[Call]:
         """Write a sample of the IMU, the gyroscope of this instant and the mean of the accelerometer
         since ``clearing``, and one of the joints with their mean torques."""
         record, sensors = self.record, self.sensors
@@ -505,27 +331,27 @@ class Plant:
         return [
             KernelCall(mean_over_steps, record.accelerometer, record.steps, force),
             KernelCall(mean_over_steps, record.joint_torque, record.steps, torque),
-            *correcting(self._params, self._robot, self.sensed[1], torque),
-            *self.reading_imu(force, imu),
-            *sensors.reading_joints(*self.sensed, torque, joints),
+            *correction_calls(self._params, self._robot, self.sensed[1], torque),
+            *self.imu_calls(force, imu),
+            *sensors.joint_calls(*self.sensed, torque, joints),
         ]
 
-    def reading_imu(self, force: Array, imu: ImuReading) -> list[Call]:
+    def imu_calls(self, force: Array, imu: ImuReading) -> list[Call]:
         """Write a sample of the IMU: the gyroscope of this instant, and this specific ``force``
         [m/s^2, body] as the accelerometer's."""
         base = self._base
         return [
-            *base.refreshing(), *self.sensors.reading_imu(self._rate, force, imu)
+            *base.refresh_calls(), *self.sensors.imu_calls(self._views.rate, force, imu)
         ]  # fmt: skip
 
-    def reading_switches(self, closed: Flags) -> list[Call]:
+    def switch_calls(self, closed: Flags) -> list[Call]:
         """Write a sample of the switches, (n_contacts,)."""
-        pressed = self.record.closed if self.switches is None else self.switches.closed
-        return self.sensors.reading_switches(self.physics.step, self.record, pressed, closed)
+        pressed = self._views.closed
+        return self.sensors.switch_calls(self.physics.step, self.record, pressed, closed)
 
     def clear_record(self) -> None:
         """Begin a new record, except for the memory of the switches."""
-        self.clearing.run()
+        self.clear_call.run()
 
     def save(self) -> None:
         """Copy the state of the simulator and of the random streams to ``physics``."""
@@ -544,20 +370,13 @@ class Plant:
             self.model, self.data, self.physics.integration, mujoco.mjtState.mjSTATE_INTEGRATION
         )
         self.streams.load(self.physics.random)
-        for call in (*self._falling, self.step1):
+        restored = [call for effect in self.effects for call in effect.restore_calls()]
+        for call in (*self._model_calls, self.step1, *restored):
             call.run()
-        if self.gears is not None:
-            self.gears.sensing().run()
 
-    def reporting_drives(self, health: RobotHealth) -> list[Call]:
+    def health_calls(self, health: RobotHealth) -> list[Call]:
         """Write the pack's voltage and the windings' temperatures to all drives, where they are simulated."""
-        found: list[Call] = []
-        if self.battery is not None:
-            found.append(KernelCall(spread_voltage, self.battery.voltage, health.voltage))
-        if self.windings is not None:
-            temperatures = self.physics.winding_temperature
-            found.append(KernelCall(read_temperatures, temperatures, health.temperature))
-        return found
+        return [call for effect in self.effects for call in effect.health_calls(health)]
 
     def voltage(self, supply: float) -> float:
         """Return the voltage of the pack [V], or of the ``supply`` where none is simulated."""
@@ -584,13 +403,7 @@ class Plant:
                 if number_of_soles(self.model)
                 else {}
             ),
-            **({} if self.imu is None else self.imu.metrics()),
-            **(self.drives.metrics() if self.drives.has_motors else {}),
-            **(
-                {"robot_hottest_winding_degc": float(self.physics.winding_temperature.max())}
-                if self.windings is not None
-                else {}
-            ),
+            **{name: value for each in self.effects for name, value in each.metrics().items()},
             **self.variation.metrics(),
         }
 

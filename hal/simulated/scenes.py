@@ -14,8 +14,8 @@ import numpy as np
 from pydantic import model_validator
 
 from ...mathematics.elementary import cos, sincos
+from ...robots.terrain import Ground, HeightField, Terrain
 from ...runtime.language.parameters import Parameters, parameter
-from ...runtime.language.terrain import Ground, HeightField, Terrain
 from .tiles import TileParameters
 
 Interval = tuple[float, float]

@@ -21,7 +21,7 @@ from ..sensors.built_in import JointSensors, SwitchSensors
 from ..sensors.imu import Imu
 from ..sensors.noise import FieldErrors, NoiseModel, delay_sample
 from ..sensors.sensor import MountedSensor, mounted_sensors
-from .simulated_robot import SimulatorParameters
+from .parameters import SimulatorParameters
 from .state import SensorMemory, TickRecord
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ class SimulatedSensor:
             start = part.stop
             true_values[name] = now[part].reshape(field.resolve({}))
             self._averaged[part] = name in sensor.averaged
-            noise = sensor.noise(name).scaled(params.sensor_errors)
+            noise = sensor.noise(name).scaled(params.sensors.sensor_errors)
             if name in sensor.averaged:
                 noise = noise.model_copy(
                     update={"noise": noise.noise * math.sqrt(samples_per_tick)}
@@ -104,7 +104,7 @@ class SimulatedSensor:
             errors = FieldErrors(noise, sensor.sizes[name], bias, streams.of_field(sensor.name, k))
             self._errors.append((part, errors))
         self._past = samples.reshape(-1, size), count, delay
-        self.after_step: list[Call] = [
+        self.after_step_calls: list[Call] = [
             *sensor.from_mujoco(model, data, true_values),
             KernelCall(accumulate, now, self._averaged, total, steps),
         ]
@@ -118,7 +118,7 @@ class SimulatedSensor:
         """Begin a new sample."""
         self._steps[0] = 0
 
-    def reading(self, out: Signal) -> list[Call]:
+    def reading_calls(self, out: Signal) -> list[Call]:
         """Write a sample, and begin the next one."""
         calls: list[Call] = [
             KernelCall(take_sample, self._averaged, self._total, self._steps, self._true)
@@ -153,12 +153,13 @@ class SimulatedSensors:
         self._robot, self._params, self._streams = robot, params, streams
         self._has_imu, self._has_switches = robot.sensors.imu, robot.sensors.switches
         self._imu = Imu("imu", SensorMount(kind="imu", link=robot.base))
+        errors = params.sensors
         gyroscope = NoiseModel(
-            noise=params.gyro_noise, bias=params.gyro_bias, range=params.gyro_range
+            noise=errors.gyro_noise, bias=errors.gyro_bias, range=errors.gyro_range
         )
         accelerometer = NoiseModel(
-            noise=params.accelerometer_noise, bias=params.accelerometer_bias,
-            range=params.accelerometer_range,
+            noise=errors.accelerometer_noise, bias=errors.accelerometer_bias,
+            range=errors.accelerometer_range,
         )  # fmt: skip
         self._imu_errors = {
             "angular_velocity": FieldErrors(
@@ -170,8 +171,8 @@ class SimulatedSensors:
             ),
         }  # fmt: skip
         self._joints = JointSensors("joints", robot.dimensions)
-        encoders = NoiseModel(bias=params.encoder_offset, resolution=params.encoder_resolution)
-        velocity = NoiseModel(noise=params.joint_velocity_noise)
+        encoders = NoiseModel(bias=errors.encoder_offset, resolution=errors.encoder_resolution)
+        velocity = NoiseModel(noise=errors.joint_velocity_noise)
         self._joint_errors = {
             "position": FieldErrors(encoders, n, stream(seed, Purpose.ENCODER_OFFSET), None),
             "velocity": FieldErrors(
@@ -181,17 +182,17 @@ class SimulatedSensors:
         }
         self.encoder_offset = self._joint_errors["position"].bias
         """The offset of every joint encoder: its reading minus the true angle [rad]."""
-        limits, points = params.switch_threshold, max(1, len(robot.contacts))
-        if params.switches.threshold is not None:
+        limits, points = errors.switch_threshold, max(1, len(robot.contacts))
+        if errors.switches.threshold is not None:
             load = robot.weight / points
-            limits = [load * share for share in params.switches.threshold]
+            limits = [load * share for share in errors.switches.threshold]
         self.switch_threshold = SwitchSensors.draw_thresholds(
             limits, len(robot.contacts), stream(seed, Purpose.SWITCH_THRESHOLD)
         )
         """The force that closes every switch [N]."""
         self.ground_force = -self.switch_threshold
         """The vertical force on the ground up to which every switch is closed [N]."""
-        self.bounce_steps = math.ceil(params.switch_bounce / params.timestep - 1e-9)
+        self.bounce_steps = math.ceil(errors.switch_bounce / params.timestep - 1e-9)
         self._kinds = mounted_sensors(robot)
         self.memory = memory or SensorMemory.allocate(self.dimensions(params, self._kinds))
         self.mounted: tuple[SimulatedSensor, ...] = ()
@@ -227,21 +228,21 @@ class SimulatedSensors:
             start, first = start + size, first + slots * size
         self.mounted = tuple(found)
 
-    def reading_imu(self, rate: Array, force: Array, out: ImuReading) -> list[Call]:
+    def imu_calls(self, rate: Array, force: Array, out: ImuReading) -> list[Call]:
         """Write a sample of the IMU from the true values [rad/s, m/s^2, body]; zero without IMU."""
         if not self._has_imu:
             return [KernelCall(read_nothing, out.angular_velocity, out.specific_force)]
         true = {"angular_velocity": rate, "specific_force": force}
-        return self._imu.reading(true, self._imu_errors, out)
+        return self._imu.reading_calls(true, self._imu_errors, out)
 
-    def reading_joints(
+    def joint_calls(
         self, position: Array, velocity: Array, torque: Array, out: JointState
     ) -> list[Call]:
         """Write a sample of encoders and currents from the joints' true motion and torques."""
         true = {"position": position, "velocity": velocity, "torque": torque}
-        return self._joints.reading(true, self._joint_errors, out)
+        return self._joints.reading_calls(true, self._joint_errors, out)
 
-    def reading_switches(
+    def switch_calls(
         self, step: Counts, record: TickRecord, pressed: Flags, closed: Flags
     ) -> list[Call]:
         """Write a sample of the switches that are ``pressed``, (n_contacts,); without switches none is
@@ -251,13 +252,15 @@ class SimulatedSensors:
             self._streams[Purpose.BOUNCE], closed,
         )  # fmt: skip
 
-    def reading_mounted(self, outputs: Mapping[str, Any]) -> list[Call]:
+    def mounted_calls(self, outputs: Mapping[str, Any]) -> list[Call]:
         """Write a sample of every mounted sensor to the signal that has its name."""
-        return [call for each in self.mounted for call in each.reading(outputs[each.sensor.name])]
+        return [
+            call for each in self.mounted for call in each.reading_calls(outputs[each.sensor.name])
+        ]
 
-    def after_step(self) -> list[Call]:
+    def after_step_calls(self) -> list[Call]:
         """Return the calls of the mounted sensors after every physics step."""
-        return [call for each in self.mounted for call in each.after_step]
+        return [call for each in self.mounted for call in each.after_step_calls]
 
 
 def _slots(sensor: MountedSensor, params: SimulatorParameters) -> int:

@@ -20,8 +20,8 @@ from ...mathematics.elementary import acos
 from ...mathematics.linear_algebra import product
 from ...robots.description import Hull, RobotDescription
 from ...robots.kinematics import ball_feet, joints_above, standing_com, standing_heights
+from ...robots.terrain import Vector
 from ...runtime.language.errors import BlockError
-from ...runtime.language.terrain import Vector
 from .base import BASES, FixedBase
 from .unsupported import uneven_contacts
 
@@ -43,7 +43,7 @@ class StartError(BlockError):
     """A simulated robot cannot start a run as it stands by its description."""
 
 
-def place_standing(
+def set_standing_pose(
     model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription, attitude: Array,
     level: bool = False, normal: Vector = UPWARDS,
 ) -> None:  # fmt: skip
@@ -190,7 +190,7 @@ def standing_torques(robot: RobotDescription, model: MjModel) -> Array:
 
     data = mujoco.MjData(model)
     base = BASES[robot.base_joint](data)
-    place_standing(model, data, base, robot, np.zeros(3))
+    set_standing_pose(model, data, base, robot, np.zeros(3))
     return product(robot.torque_to_motor, holding_torque(model, data, base, robot))
 
 

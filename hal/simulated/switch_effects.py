@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
-from ...mathematics.arrays import Flags, Flags1D
+from ...mathematics.arrays import Array, Flags, Flags1D
+from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...runtime.language.steps import signal_call
+from .effect import Effect, StepViews
 from .effects import SwitchEffects
 from .state import PhysicsState
 
@@ -27,7 +29,7 @@ def settle_switches(pressed: Flags1D, debounce: int, sticking: int, memory: Phys
             memory.switch_waits[point] = 0
 
 
-class SwitchDelays:
+class SwitchDelays(Effect):
     """The delays of all switches of a robot.
 
     Args:
@@ -45,11 +47,19 @@ class SwitchDelays:
         self._debounce = math.ceil(effects.debounce / timestep - 1e-9)
         self._sticking = math.ceil(effects.sticking / timestep - 1e-9)
 
-    def begin(self) -> None:
+    def begin(self, position: Array) -> None:
         """No switch is closed."""
         self._memory.switch_closed[:] = False
         self._memory.switch_waits[:] = 0
 
-    def settling(self, pressed: Flags) -> KernelCall:
+    def seen(self, views: StepViews) -> StepViews:
+        """Return the views with the switches as late as they are."""
+        return views._replace(closed=self.closed)
+
+    def reading_calls(self, views: StepViews) -> list[Call]:
+        """Update ``closed``."""
+        return [self.settle_call(views.closed)]
+
+    def settle_call(self, pressed: Flags) -> KernelCall:
         """Return the call that updates ``closed`` after a physics step."""
         return signal_call(settle_switches, pressed, self._debounce, self._sticking, self._memory)

@@ -77,17 +77,17 @@ class SimulatedThrusters:
         self._robot, self._model, self._data = robot, model, data
         self._commands, self._queue = commands, queue
 
-    def sending(self, command: ThrustCommand) -> KernelCall:
+    def send_call(self, command: ThrustCommand) -> KernelCall:
         """Return the call that sends a command with the joint command that was sent before."""
         return signal_call(send_thrust, command, self._commands, self._queue)
 
-    def following(self) -> KernelCall:
+    def follow_call(self) -> KernelCall:
         """Lets the active command act in the next physics step."""
         most = np.array([each.max_thrust for each in self._robot.thrusters.values()])
         thrust = self._data.ctrl[len(self._robot.joints) :]
         return signal_call(give_thrust, self._commands, self._queue, most, thrust)
 
-    def reading(self, state: ThrusterState) -> KernelCall:
+    def read_call(self, state: ThrusterState) -> KernelCall:
         """Return the call that publishes the present thrust, as from rotor speeds: without the factors that the seed
         draws."""
         first = len(self._robot.joints)

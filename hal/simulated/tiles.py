@@ -11,8 +11,8 @@ from pydantic import model_validator
 
 from ...robots.description import RobotDescription
 from ...robots.kinematics import ball_feet, standing_contacts
+from ...robots.terrain import Ground, Terrain
 from ...runtime.language.parameters import Parameters, parameter
-from ...runtime.language.terrain import Ground, Terrain
 
 Interval = tuple[float, float]
 Area = tuple[Interval, Interval]

@@ -17,8 +17,8 @@ from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.ground_surface import Surface, height_of_ground
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
+from ...robots.terrain import Terrain
 from ...runtime.language.steps import signal_call
-from ...runtime.language.terrain import Terrain
 from .base import FixedBase
 from .stance import depth_of_contacts
 from .state import TickRecord
@@ -127,9 +127,9 @@ class TruthReport:
         )
         self._record = record
 
-    def reporting(self, truth: RobotTruth) -> tuple[KernelCall, KernelCall]:
+    def report_calls(self, truth: RobotTruth) -> tuple[KernelCall, KernelCall]:
         """Write all fields of the truth."""
         return (
-            self._base.publishing(truth),
+            self._base.publish_call(truth),
             signal_call(report_truth, self._instant, self._record, truth),
         )

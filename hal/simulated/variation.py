@@ -14,7 +14,7 @@ from ...robots.description import RobotDescription
 from ..random_streams import Purpose, stream
 from .effects import CableParameters, JointEffects
 from .imu_effects import NOMINAL, ImuPose, draw_imu_pose, draw_spread
-from .simulated_robot import SimulatorParameters
+from .parameters import SimulatorParameters
 
 
 @dataclass(frozen=True)
@@ -72,10 +72,11 @@ class Variation:
 
 def _gravity(params: SimulatorParameters) -> tuple[float, float, float]:
     """Gravity [m/s^2] in the frame of a floor that leans."""
-    if not params.floor_tilt:
+    tilt = params.ground.floor_tilt
+    if not tilt:
         return 0.0, 0.0, -GRAVITY
     heading = 2.0 * math.pi * float(stream(params.seed, Purpose.FLOOR_TILT).random())
-    along, down = GRAVITY * sin(params.floor_tilt), GRAVITY * cos(params.floor_tilt)
+    along, down = GRAVITY * sin(tilt), GRAVITY * cos(tilt)
     return along * cos(heading), along * sin(heading), -down
 
 
@@ -100,6 +101,8 @@ def draw_pull(
 def draw_variation(params: SimulatorParameters, robot: RobotDescription) -> Variation:
     """Draw the variation of the world from the seed in these parameters."""
 
+    ground, body, actuators = params.ground, params.body, params.actuators
+
     def uniform(purpose: Purpose) -> float:
         return float(stream(params.seed, purpose).uniform(-1.0, 1.0))
 
@@ -109,18 +112,18 @@ def draw_variation(params: SimulatorParameters, robot: RobotDescription) -> Vari
         draws = stream(params.seed, purpose).uniform(-1.0, 1.0, count)
         return tuple((1.0 + spread * draws).tolist())
 
-    friction = params.friction
-    if params.friction_range is not None:
-        low, high = params.friction_range
+    friction = ground.friction
+    if ground.friction_range is not None:
+        low, high = ground.friction_range
         friction = low + (high - low) * 0.5 * (1.0 + uniform(Purpose.FRICTION))
-    stiffness = params.contact_stiffness * params.contact_stiffness_spread ** uniform(
+    stiffness = ground.contact_stiffness * ground.contact_stiffness_spread ** uniform(
         Purpose.CONTACT_STIFFNESS
     )
     x, y, z = draw_spread(
-        tuple(params.base_com_offset), params.base_com_spread, params.seed, Purpose.BASE_COM
+        tuple(body.base_com_offset), body.base_com_spread, params.seed, Purpose.BASE_COM
     )
-    mass = params.mass_scale * (1.0 + params.mass_spread * uniform(Purpose.MASS))
-    links, joints, n = params.links, params.joints, len(robot.joints)
+    mass = body.mass_scale * (1.0 + body.mass_spread * uniform(Purpose.MASS))
+    links, joints, n = body.links, actuators.joints, len(robot.joints)
     centres: tuple[tuple[float, float, float], ...] = ()
     if links.com_spread:
         draws = stream(params.seed, Purpose.LINK_COM).uniform(-1.0, 1.0, (len(robot.links), 3))
@@ -129,14 +132,14 @@ def draw_variation(params: SimulatorParameters, robot: RobotDescription) -> Vari
     if joints.rotor_inertia != 1.0:
         rotors = tuple(joints.rotor_inertia * each for each in rotors or (1.0,) * n)
     return Variation(
-        friction, stiffness, mass, (x, y, z), params.joint_friction,
+        friction, stiffness, mass, (x, y, z), actuators.joint_friction,
         factors(Purpose.LINK_MASS, links.mass_spread, len(robot.links)), centres,
         factors(Purpose.LINK_INERTIA, links.inertia_spread, len(robot.links)),
         factors(Purpose.JOINT_FRICTION, joints.friction_spread, n), rotors,
-        draw_imu_pose(params.imu, params.seed) if params.imu.moved else NOMINAL,
-        1.0 if params.gears is None else params.gears.output_share,
-        None if params.soles is None else (params.soles.time_constant, params.soles.damping_ratio),
+        draw_imu_pose(params.sensors.imu, params.seed) if params.sensors.imu.moved else NOMINAL,
+        1.0 if actuators.gears is None else actuators.gears.output_share,
+        None if ground.soles is None else (ground.soles.time_constant, ground.soles.damping_ratio),
         _gravity(params), factors(Purpose.LINK_LENGTH, links.length_spread, len(robot.links)),
         _static_friction(joints, params.seed, n),
-        factors(Purpose.THRUST, params.thrust_spread, len(robot.thrusters)),
+        factors(Purpose.THRUST, actuators.thrust_spread, len(robot.thrusters)),
     )  # fmt: skip

@@ -13,16 +13,20 @@ loses torque sooner with speed below it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
+from ...blocks.signals import RobotHealth
 from ...mathematics.arrays import Array, Array1D
+from ...mathematics.compiling.call_sequence import Call
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.steps import signal_call
 from .drives import DriveTrain, MotorLimits, MotorScratch
+from .effect import Effect, StepViews
 from .effects import WindingParameters
 from .state import PhysicsState
 
@@ -92,7 +96,7 @@ def read_temperatures(windings: Array1D, drives: Array1D) -> None:
     drives[:] = windings
 
 
-class Windings:
+class Windings(Effect):
     """The windings of a simulated robot.
 
     Args:
@@ -122,14 +126,31 @@ class Windings:
         self.warm = WarmMotors(*(each.copy() for each in self._model[-4:]))
         self._start, self._memory = params.temperature, memory
 
-    def begin(self) -> None:
+    def begin(self, position: Array) -> None:
         """All windings are as warm as at the start."""
         self._memory.winding_temperature[:] = self._start
 
-    def limiting(self, limits: MotorLimits) -> KernelCall:
-        """Return the call that sets the motors' limits at their temperature, before a physics step."""
+    def limit_calls(self, limits: MotorLimits) -> list[Call]:
+        """Set what the motors can do at their temperature."""
+        return [self.limit_call(limits)]
+
+    def torque_calls(self, views: StepViews, limits: MotorLimits) -> list[Call]:
+        """Heat the windings, and let them cool."""
+        return [self.heat_call(limits)]
+
+    def limit_call(self, limits: MotorLimits) -> KernelCall:
+        """Return the call that sets what the motors can do at their temperature."""
         return signal_call(warm_motors, self._model, self.warm, limits.motors, self._memory)
 
-    def heating(self, limits: MotorLimits) -> KernelCall:
-        """Heats the windings in a physics step, and lets them cool."""
+    def heat_call(self, limits: MotorLimits) -> KernelCall:
+        """Return the call that heats the windings in a physics step, and lets them cool."""
         return signal_call(heat_windings, self._model, self.warm, limits.scratch, self._memory)
+
+    def health_calls(self, health: RobotHealth) -> list[Call]:
+        """Write the windings' temperatures [deg C]."""
+        temperatures = self._memory.winding_temperature
+        return [KernelCall(read_temperatures, temperatures, health.temperature)]
+
+    def metrics(self) -> Mapping[str, float]:
+        """Return the temperature of the hottest winding [deg C]."""
+        return {"robot_hottest_winding_degc": float(self._memory.winding_temperature.max())}

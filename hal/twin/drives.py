@@ -71,13 +71,13 @@ class EmulatedDrives:
         self.current = np.zeros(n)
         """The torque current of every actuator [A]."""
         self.position = np.zeros(n)
-        """What every actuator's encoder reads [rad]; a stuck one stays."""
+        """Angle that every actuator's encoder reads [rad]; a stuck one stays."""
         self.velocity = np.zeros(n)
         """The velocity that every encoder reads [rad/s]."""
         self.stuck = np.zeros(n, dtype=np.bool_)
-        """Which encoders are stuck."""
+        """True for encoders that are stuck."""
         self.goals = np.zeros((n, 6))
-        """What acts now: goal current, position, velocity, P, D, and the current's limit."""
+        """Goals in force: current, position, velocity, P, D, and the current's limit."""
         self.queue = np.zeros((_SLOTS, n, 6))
         self.dues = np.zeros(_SLOTS, dtype=np.int64)
         self.first = self.waiting = 0

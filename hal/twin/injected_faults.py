@@ -61,7 +61,7 @@ class InjectedFaults:
         ]
 
     def of(self, target: str, *kinds: Kind) -> list[InjectedFault]:
-        """Those of them that concern ``target``, after the draw of their share."""
+        """Return the active faults that concern ``target``, after the draw of their share."""
         return [
             fault
             for fault in self.active(*kinds)

@@ -16,8 +16,8 @@ from ..bear.protocol import BROADCAST, Instruction, frame_bytes
 from ..random_streams import Purpose
 from ..sensors.sensor import mounted_sensors
 from ..simulated.drives import SimulatedDrives
+from ..simulated.parameters import SimulatorParameters
 from ..simulated.plant import Plant
-from ..simulated.simulated_robot import SimulatorParameters
 from ..simulated.state import DriveState, PhysicsState, SensorMemory, TickRecord
 from .devices import EmulatedActuator, EmulatedBoard, EmulatedBus
 from .drives import EmulatedDrives
@@ -25,7 +25,7 @@ from .injected_faults import ANSWERS, InjectedFault, InjectedFaults, apply_fault
 from .snapshot import Attributes
 
 BRAKING = 0.5
-"""Of an actuator with shorted windings [N m s/rad]: an estimate."""
+"""Braking of an actuator with shorted windings [N m s/rad]: an estimate."""
 SUPPLY = 14.8
 """The battery's voltage [V]."""
 
@@ -65,9 +65,11 @@ class Twin:
         sensed: SensorMemory | None = None,
     ) -> None:  # fmt: skip
         period = hardware.bus.period
-        finer = {"accelerometer_noise": params.accelerometer_noise * math.sqrt(tick / period)}
+        errors = params.sensors
+        finer = {"accelerometer_noise": errors.accelerometer_noise * math.sqrt(tick / period)}
+        changed = {"sensors": errors.model_copy(update=finer)}
         self.plant = Plant(
-            robot, params.model_copy(update=finer), tick, physics, record, sensed, tick / period
+            robot, params.model_copy(update=changed), tick, physics, record, sensed, tick / period
         )
         self._names = robot.transmission.motors
         self.actuators = [EmulatedActuator(hardware.motors[name].id) for name in self._names]
@@ -78,15 +80,15 @@ class Twin:
         self.limits = self.drives.limits
         self.faults = InjectedFaults(faults, params.seed)
         self.lockstep = True
-        """Whether time goes on with the exchanges; else only by ``advance``."""
+        """True if time goes on with the exchanges; else it does only by ``advance``."""
         self.released = False
         self.exchanges = 0
         self.zero = 0
         """The exchange in which the gantry let go."""
         self._gantry = SimulatedDrives(robot, self.plant.damping, gantry, record)
         self._held = np.zeros(len(robot.joints))
-        self._standing = self.plant.simulating(self._gantry, 1)
-        self._step = self.plant.simulating(self, 1)
+        self._standing = self.plant.simulation(self._gantry, 1)
+        self._step = self.plant.simulation(self, 1)
         self._pushed = self._step
         self._push: ExternalForce | None = None
         self._record, self._params, self._hardware = record, params, hardware
@@ -108,15 +110,15 @@ class Twin:
         self._current, self._nothing = np.zeros(n), np.zeros(n)
         plant, sensors = self.plant, self.plant.sensors
         self._reading_joints = CallSequence(
-            sensors.reading_joints(*plant.sensed, self._nothing, self._sample)
+            sensors.joint_calls(*plant.sensed, self._nothing, self._sample)
         )
-        self._reading_imu = CallSequence(plant.reading_imu(self._force, self._imu))
-        self._reading_switches = CallSequence(plant.reading_switches(self.closed))
+        self._reading_imu = CallSequence(plant.imu_calls(self._force, self._imu))
+        self._reading_switches = CallSequence(plant.switch_calls(self.closed))
         self._samples = {
             sensor.name: sensor.signal.allocate(robot.dimensions)
             for sensor in mounted_sensors(robot)
         }
-        self._reading_mounted = CallSequence(sensors.reading_mounted(self._samples))
+        self._reading_mounted = CallSequence(sensors.mounted_calls(self._samples))
         self._on_board = hardware.board.mounted(robot)
         self._packet = b""
         self._to_board = b""
@@ -217,7 +219,7 @@ class Twin:
     def set_push(self, push: ExternalForce | None) -> None:
         """Apply this force from outside from now on, once the gantry has let go; ``None``: none."""
         self._push = push
-        self._pushed = self._step if push is None else self.plant.simulating(self, 1, push)
+        self._pushed = self._step if push is None else self.plant.simulation(self, 1, push)
 
     def torque_call(
         self, step: Indices, position: Array, velocity: Array, speed: Array, out: Array

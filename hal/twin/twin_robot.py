@@ -14,10 +14,10 @@ from ..bear.driven_robot import DrivenRobot, DriveParameters, missing_sensors, r
 from ..bear.driver import DriveLaw, Driver
 from ..bear.motor_loop import CommandQueue
 from ..drive_control import joint_gains
+from ..simulated.parameters import SimulatorParameters
 from ..simulated.plant import Plant
 from ..simulated.simulated_robot import (
     SimulatedRobot,
-    SimulatorParameters,
     impossible_effects,
 )
 from ..simulated.state import DriveState, PhysicsState, TickRecord
@@ -116,8 +116,8 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
 
     A gantry holds the robot in its standing pose until the drives are on and get a first current.
 
-    ``drive_damping`` is not used: drives in damping brake as shorted windings do. Nor is
-    ``bus_period``: the file of the hardware has it.
+    ``actuators.drive_damping`` is not used: drives in damping brake as shorted windings do. Nor is
+    ``actuators.bus_period``: the file of the hardware has it.
     """
 
     Params = TwinParameters
@@ -196,7 +196,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
             tuple(params.faults), getattr(self, "sensor_memory", None),
         )  # fmt: skip
         self.twin.set_push(self.push)
-        self._reporting = self.twin.plant.truth.reporting(self.truth)
+        self._reporting = self.twin.plant.truth.report_calls(self.truth)
         self._hardware = hardware
         self.driver = _driver(robot, params, hardware, self.twin)
         self._queue = CommandQueue(self.driver.loop, robot, params.latency, self.period)
@@ -269,10 +269,13 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
     def example_parameters(cls) -> Mapping[str, Any]:
         """All disturbances at once, so that the conformance suite covers them."""
         return {
-            "gyro_noise": 0.02, "gyro_bias": 0.01, "accelerometer_noise": 0.1,
-            "accelerometer_bias": 0.1, "encoder_offset": 0.003, "joint_velocity_noise": 0.05,
-            "switch_threshold": [0.5, 3.0], "switch_bounce": 0.002, "latency": 0.002,
-            "jitter": 0.0005, "initial_attitude_error": 0.01, "random_start_phase": True,
+            "latency": 0.002, "jitter": 0.0005,
+            "start": {"initial_attitude_error": 0.01, "random_start_phase": True},
+            "sensors": {
+                "gyro_noise": 0.02, "gyro_bias": 0.01, "accelerometer_noise": 0.1,
+                "accelerometer_bias": 0.1, "encoder_offset": 0.003, "joint_velocity_noise": 0.05,
+                "switch_threshold": [0.5, 3.0], "switch_bounce": 0.002,
+            },
         }  # fmt: skip
 
 

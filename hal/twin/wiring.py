@@ -9,7 +9,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...robots.robot_description import RobotDescription
 from ..bear.configuration import Hardware, imu_rotation_of
-from ..simulated.simulated_robot import SimulatorParameters
+from ..simulated.parameters import SimulatorParameters
 from .twin import Twin, standing_twin
 
 

@@ -144,7 +144,7 @@ SEED = 7001
 """The seed of the recorded jumps; the next ones follow it."""
 JUMPS: dict[str, dict[str, Any]] = {
     "as shipped": {},
-    "slipping": {"robot.friction": 0.35, "wbc.friction": 0.1},
+    "slipping": {"robot.ground.friction": 0.35, "wbc.friction": 0.1},
     "torque-limited": {"wbc.torque_margin": 0.35},
     "turning": {"plan.task": "tasks/twist_30deg.yaml"},
     "aside": {"plan.task": "tasks/side_10cm.yaml"},

@@ -56,7 +56,7 @@ def _changes(target: Command, at: float) -> Command:
     return {**target, "replaces": True, "at": round(at, 3)}
 
 
-def place_changes(rng: np.random.Generator) -> list[Command]:
+def position_changes(rng: np.random.Generator) -> list[Command]:
     """Draw moves of the place by up to 10 cm before lift-off."""
     first = _target(rng)
     return [first, _changes(_beside(rng, first, 0.1, 0.0), LIFT_OFF - rng.uniform(*BEFORE))]
@@ -95,7 +95,7 @@ def several_changes(rng: np.random.Generator) -> list[Command]:
 
 
 KINDS: Mapping[str, Callable[[np.random.Generator], list[Command]]] = {
-    "place": place_changes, "turn": turn_changes, "height": height_changes,
+    "place": position_changes, "turn": turn_changes, "height": height_changes,
     "in flight": flight_changes, "several": several_changes,
 }  # fmt: skip
 
@@ -141,7 +141,7 @@ def run_changed(kind: str, seed: int, more: Mapping[str, Any] | None = None) -> 
     commands = KINDS[kind](rng)
     sets: dict[str, Any] = {"commands.commands": commands, "score.jumps": 1, "duration": 6.0}
     if kind == "height":
-        sets["robot.scene"] = two_levels(commands[-1]["ahead"], commands[-1]["up"])
+        sets["robot.ground.scene"] = two_levels(commands[-1]["ahead"], commands[-1]["up"])
     return run_seed(seed, "steer.yaml", (SENSOR,), {**sets, **(more or {})})
 
 

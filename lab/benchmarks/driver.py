@@ -29,7 +29,7 @@ from ...hal.bear.configuration import Hardware
 from ...hal.bear.driver import DriveLaw, Driver
 from ...hal.bear.measurement import READ
 from ...hal.bear.motor_loop import WRITE
-from ...hal.simulated.simulated_robot import SimulatorParameters
+from ...hal.simulated.parameters import SensorParameters, SimulatorParameters
 from ...hal.twin.twin import standing_twin
 from ...hal.twin.twin_robot import VirtualBoardPort, VirtualBusPort
 from ...mathematics.compiling.compile_calls import compile_calls
@@ -83,7 +83,9 @@ def recorded() -> tuple[Driver, Talk]:
     """Return a driver of BRUCE whose drives are on and follow a command, and its recorded talk."""
     robot = find_robot("bruce")
     hardware = Hardware.for_twin(robot)
-    twin = standing_twin(robot, SimulatorParameters(gyro_noise=NOISE), hardware)
+    twin = standing_twin(
+        robot, SimulatorParameters(sensors=SensorParameters(gyro_noise=NOISE)), hardware
+    )
     bus, board = _RecordingBus(twin), _RecordingBoard(twin)
     stiffness = np.full(len(robot.joints), 3.5)
     with collect_calls() as calls:

@@ -35,7 +35,7 @@ RATES = (500, 1000, 5000)
 _PROGRAM = Path(__file__).with_name("export_ticks.c")
 
 
-class _TimedLibrary:
+class _TimedController:
     """The library on the recorded inputs, in the manner of ``RecordedController``."""
 
     def __init__(self, jump: RecordedJump, fused: RecordedController, description: Path) -> None:
@@ -107,7 +107,7 @@ def export(
         cases[TSID] = _tsid_controller(jump, module)
     with tempfile.TemporaryDirectory(prefix="aloft-bench-") as folder:
         written = write_library(str(GRAPH), Path(folder) / "jumper")
-        cases[LIBRARY] = own = _TimedLibrary(jump, fused, written.description)
+        cases[LIBRARY] = own = _TimedController(jump, fused, written.description)
         names = list(cases)
         with _quiet():
             for _ in range(rounds + 1):
@@ -175,7 +175,7 @@ def _rows_in_c(
     return rows
 
 
-def _in_c(description: Path, own: _TimedLibrary, count: int, seconds: float) -> dict[str, Any]:
+def _in_c(description: Path, own: _TimedController, count: int, seconds: float) -> dict[str, Any]:
     """Run the program in C and return the figures that it prints."""
     folder, name = description.parent, own.library.about["name"]
     write_names(own.library.about, folder)

@@ -27,6 +27,7 @@ from ...runtime.loading.reading.files import FOLDER
 from ...runtime.running.executor import Executor
 from ...runtime.running.memory import BoundGraph
 from ...runtime.running.run_result import RunResult
+from ...runtime.running.sink import Sink
 from ...runtime.testing.allocations import count_array_allocations
 from .rows import Row
 
@@ -198,7 +199,7 @@ def _parquet(rows: NDArray[np.uint8]) -> bytes:
     return bytes(out.getvalue())
 
 
-class _MemoryWatch:
+class _MemoryWatch(Sink):
     """A sink that looks at the memory of a recorder's process now and then."""
 
     def __init__(self, sink: Recorder) -> None:
@@ -215,9 +216,6 @@ class _MemoryWatch:
             status = Path(f"/proc/{self.sink.link.process_id}/statm")
             if status.exists():
                 self.found.append(int(status.read_text().split()[1]) * 4096)
-
-    def close(self) -> None:
-        """Do nothing."""
 
     def growth(self) -> float | None:
         """Return the mebibytes by which the last quarter's median is above that of the second

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib.util import find_spec
-from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ... import __version__
 from ...cli.shared.options import JsonBesideTables
 from ...cli.shared.output import console, errors_reported, number, print_json, say, table
 from ...runtime.language.errors import AloftError, ExitCode
@@ -17,30 +14,13 @@ from ...runtime.language.errors import AloftError, ExitCode
 if TYPE_CHECKING:
     from rich.console import Console
 
-FROM_SOURCE = f"""the benchmarks are not in the wheel; install aloft from its source instead:
-    pip download --no-deps --no-binary :all: aloft-robotics=={__version__}
-    tar xzf aloft_robotics-{__version__}.tar.gz
-    pip install --editable aloft_robotics-{__version__}
-or, in a clone of the repository: pip install --editable ."""
-
-
-def find_catalogue() -> ModuleType:
-    """Import the module that names all benchmarks, which lie beside the package in its source.
-
-    Raises:
-        AloftError: aloft was installed from a wheel, which has no benchmarks.
-    """
-    if find_spec(f"{__package__.rpartition('.')[0]}.benchmarks") is None:
-        raise AloftError(FROM_SOURCE)
-    from ..benchmarks import catalogue
-
-    return catalogue
-
 
 def benchmark_names(incomplete: str) -> list[str]:
     """List the names of benchmarks that begin with a text; none where there are no benchmarks."""
     try:
-        names = find_catalogue().BENCHMARKS
+        from ..benchmarks import catalogue
+
+        names = catalogue.BENCHMARKS
     except AloftError:
         return []
     return [name for name in names if name.startswith(incomplete)]
@@ -116,7 +96,8 @@ def bench(
 
     out = console(to_stderr=as_json)
     with errors_reported(as_json):
-        catalogue = find_catalogue()
+        from ..benchmarks import catalogue
+
         if name and name not in catalogue.BENCHMARKS:
             raise AloftError(
                 f"there is no benchmark {name!r}; there is {', '.join(catalogue.BENCHMARKS)}"

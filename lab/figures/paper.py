@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image as Picture
 
     from ...robots.description import RobotDescription
-    from ...runtime.language.terrain import Terrain
+    from ...robots.terrain import Terrain
     from ...studies.expansion import Cell
     from ...studies.summary import StudyRow
     from .trace import Trace

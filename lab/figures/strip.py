@@ -10,7 +10,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...plotting import FAINT, image, new_figure, style
-from ...runtime.language.terrain import Terrain
+from ...robots.terrain import Terrain
 from ...studies.offscreen import Offscreen, View
 
 if TYPE_CHECKING:

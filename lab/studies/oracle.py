@@ -13,7 +13,7 @@ import numpy as np
 
 from ...hal.random_streams import Purpose, stream
 from ...hal.simulated.imu_effects import draw_delays, draw_imu_pose
-from ...hal.simulated.simulated_robot import SimulatorParameters
+from ...hal.simulated.parameters import SimulatorParameters
 from ...hal.simulated.variation import draw_variation
 from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
@@ -66,7 +66,7 @@ def oracle_values(
 def _imu(
     params: SimulatorParameters, errors: CalibrationErrors, draw: np.random.Generator
 ) -> dict[str, Any]:
-    place, angle = map(np.array, draw_imu_pose(params.imu, params.seed))
+    place, angle = map(np.array, draw_imu_pose(params.sensors.imu, params.seed))
     return {
         "timing.imu_position": (place + errors.position * draw.normal(size=3)).tolist(),
         "timing.imu_rotation": (angle + errors.rotation * draw.normal(size=3)).tolist(),
@@ -89,7 +89,7 @@ def reading_ages(params: SimulatorParameters) -> ReadingAges:
     is integrated semi-implicitly, q[k+1] = q[k] + T v[k+1]: velocities, and specific forces that are their
     differences, are half a step older than the angles beside them.
     """
-    imu, encoders, step = params.imu, params.encoders, params.timestep
+    imu, encoders, step = params.sensors.imu, params.sensors.encoders, params.timestep
     half = 0.5 * step
     filtered = 0.0
     if imu.bandwidth is not None:  # of second order, maximally flat, by the bilinear transform
@@ -107,7 +107,7 @@ def _ages(
     params: SimulatorParameters, errors: CalibrationErrors, draw: np.random.Generator
 ) -> dict[str, Any]:
     """Return the ages of the readings [s], and the delay that the controller must bridge."""
-    band = params.motors.current_bandwidth
+    band = params.actuators.motors.current_bandwidth
     ages = np.array(reading_ages(params))
     ages = np.maximum(0.0, ages + errors.age * draw.normal(size=4))
     loop = 0.0 if band is None else 1.0 / (2.0 * math.pi * band)
@@ -124,7 +124,7 @@ def _motors(
     errors: CalibrationErrors,
     draw: np.random.Generator,
 ) -> dict[str, Any]:
-    motors, n = params.motors, len(robot.joints)
+    motors, n = params.actuators.motors, len(robot.joints)
     spread = stream(params.seed, Purpose.TORQUE_CONSTANT).uniform(-1.0, 1.0, n)
     constant = motors.torque_constant * (1.0 + motors.torque_constant_spread * spread)
     constant = constant * (1.0 + errors.torque_constant * draw.normal(size=n))
@@ -146,7 +146,9 @@ def _joints(
 ) -> dict[str, Any]:
     variation, n = draw_variation(params, robot), len(robot.joints)
     factor = np.array([variation.factor(variation.friction_of_joint, k) for k in range(n)])
-    factor = params.joint_friction * factor * (1.0 + errors.friction * draw.normal(size=n))
+    factor = (
+        params.actuators.joint_friction * factor * (1.0 + errors.friction * draw.normal(size=n))
+    )
     rotors = [variation.factor(variation.rotor_inertia, k) for k in range(n)]
     friction = _by_joint(robot, (factor - 1.0) * robot.motors.friction)
     damping = _by_joint(robot, (factor - 1.0) * robot.motors.damping)
@@ -155,7 +157,9 @@ def _joints(
         "joint_pd.damping": damping,
         "weight.friction": friction,
         "weight.damping": damping,
-        "timing.play": float(params.encoders.backlash * robot.motors.gear_play.max(initial=0.0)),
+        "timing.play": float(
+            params.sensors.encoders.backlash * robot.motors.gear_play.max(initial=0.0)
+        ),
         "dynamics.rotor_inertia": _by_joint(robot, rotors),
     }
 
@@ -170,6 +174,6 @@ def _named(names: Sequence[str], values: Sequence[float] | Array) -> dict[str, f
 
 def _pack(params: SimulatorParameters, robot: RobotDescription) -> dict[str, Any]:
     """Return the pack's resistance, so that its sag under load is no fault."""
-    if params.battery is None:
+    if params.actuators.battery is None:
         return {}
-    return {"safety.pack_resistance": params.battery.of(robot).resistance}
+    return {"safety.pack_resistance": params.actuators.battery.of(robot).resistance}

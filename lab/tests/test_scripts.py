@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -112,10 +114,11 @@ def test_what_the_package_weighs() -> None:
     assert WEIGH.widest({"total": total})[0] == (3, "a/one.py:17 step")
 
 
-def test_benchmarks_weigh_for_themselves() -> None:
-    bench = {
-        "benchmarks/one.py": "from ..b.two import Told\n\n\nclass Told(NamedTuple):\n    x: int\n"
-    }
-    weights = WEIGH.weigh(WEIGH.parse(SOURCES | bench))
-    assert weights.pop("benchmarks").counts["lines"] == 5
-    assert weights == WEIGH.weigh(WEIGH.parse(SOURCES))
+@pytest.mark.parametrize(("folder", "row"), [("lab/a", "lab"), ("extensions/x/a", "extensions/x")])
+def test_what_is_beside_the_core_weighs_for_itself(folder: str, row: str) -> None:
+    text = "from ..b.two import Told\n\n\nclass Told(NamedTuple):\n    x: int\n"
+    beside = {f"{folder}/one.py": text, f"{folder}/tests/test_one.py": text}
+    weights, core = WEIGH.weigh(WEIGH.parse(SOURCES | beside)), WEIGH.weigh(WEIGH.parse(SOURCES))
+    assert weights.pop(row).counts["lines"] == 5
+    assert weights.pop("all").counts["lines"] == core.pop("all").counts["lines"] + 5
+    assert weights == core

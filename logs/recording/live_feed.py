@@ -20,7 +20,7 @@ from ...runtime.links.observer import Observer
 from ...runtime.links.part import part_graph
 from ...runtime.running.failures import describe
 from ...runtime.running.memory import Memory
-from ...runtime.running.sinks import Note
+from ...runtime.running.sink import Note
 from ..file.format import Header
 from ..file.header import make_header
 from ..viewing.blueprint import recording_blueprint

@@ -25,7 +25,8 @@ from ...runtime.language.errors import AloftError
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import BoundGraph
 from ...runtime.running.run_result import RunResult
-from ...runtime.running.sinks import Note, parameter_note
+from ...runtime.running.sink import Note, Sink, parameter_note
+from ..file.code import code_of, remember
 from ..file.header import header_of
 from ..file.reader import read
 from .output_file import cause_of, remedy, replaced, reserve_output, unfinished_name
@@ -43,7 +44,7 @@ GIVE_UP_TIME = 600.0
 WhenFull = Literal["wait", "drop"]
 
 
-class Recorder:
+class Recorder(Sink):
     """A sink that records into one file, replacing what was there when the run has ended.
 
     Args:
@@ -171,6 +172,9 @@ class Recorder:
             return "Rerun cannot be imported", "pip install rerun-sdk, or --no-record writes none"
         rate, frame = self._bound.graph.base_rate, 4 * space_of(len(self._frame))
         capacity = round(self._ring_time * rate) * space_of(len(self._bus)) + frame
+        graph = self._bound.graph
+        if graph.resolved is not None:
+            remember(code_of(graph.resolved, graph.robot))  # what the user runs he may run again
         header = header_of(self._bound).to_json()
         try:
             output = None
@@ -299,9 +303,6 @@ class Recorder:
         """Put a note into the ring; there is nearly always room."""
         if self.link is not None and not self._write(NOTE, note.tick, _encoded(note)):
             self._wait_for_room(NOTE, note.tick, _encoded(note))
-
-    def close(self) -> None:
-        """No-op: the recording ends when the outcome is known, in ``finish``."""
 
     def finish(self, result: RunResult) -> list[str]:
         """Have the outcome written, and wait for the process to end. Returns what went wrong."""

@@ -28,7 +28,7 @@ import numpy as np
 from ...processes.child import report_ready
 from ...runtime.running.failures import describe
 from ...runtime.running.memory import Snapshot
-from ...runtime.running.sinks import Note
+from ...runtime.running.sink import Note
 from ..file.format import Header
 from .output_file import OutputFile, cause_of, reserve_output, split_name
 from .recorder_protocol import KEYFRAME, NOTE, REWIND, ROW, RecorderReport, RecorderTask

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.running.sinks import Note
+from ...runtime.running.sink import Note
 from ..file.format import (
     EVENTS,
     GRAPH,

@@ -9,6 +9,9 @@ are fed from the recording:
   repeated on its recorded sensor readings;
 * only some changed blocks run. This shows what they would have done in the recorded situation; their
   outputs do not act on the recorded run.
+
+Nothing outside is touched in any of them: blocks whose outputs come from the real world, and those that act on it
+(``Block.acts_outside``), never run.
 """
 
 from __future__ import annotations
@@ -24,14 +27,15 @@ from numpy.typing import NDArray
 from ...runtime.language.errors import AloftError
 from ...runtime.language.layout import Layout
 from ...runtime.language.parameter_change import ParameterChange
-from ...runtime.language.stages import CheckedGraph, ClockSpec
+from ...runtime.language.registry import block_name
+from ...runtime.language.stages import BlockSpec, CheckedGraph, ClockSpec
 from ...runtime.loading.checking.parameters import adjust
 from ...runtime.running.differences import Comparison, Difference, Translation
 from ...runtime.running.executor import Executor
 from ...runtime.running.memory import BoundGraph, Snapshot
 from ...runtime.running.playback import Playback, PlaybackBlock, playback_graph
 from ...runtime.running.run_result import RunResult
-from ...runtime.running.sinks import Note, Sink
+from ...runtime.running.sink import Note, Sink
 
 
 class Replayable(Protocol):
@@ -113,7 +117,7 @@ class KeptRun:
         return self.snapshots[tick]
 
 
-class Keyframes:
+class Keyframes(Sink):
     """A sink that takes a snapshot before every tick that ``every`` divides, except the first."""
 
     def __init__(self, every: int) -> None:
@@ -132,9 +136,6 @@ class Keyframes:
         if (tick + 1) % self.every == 0:
             taken = self._bound.snapshot()
             self.snapshots[tick + 1] = Snapshot(tick + 1, taken.bus, taken.state)
-
-    def close(self) -> None:
-        """Do nothing."""
 
 
 def late_blocks(notes: Iterable[Note]) -> tuple[str, ...]:
@@ -250,7 +251,8 @@ def replay(
         sinks: further sinks of the run.
 
     Raises:
-        ReplayError: there is no such block or no such tick, or ticks are missing.
+        ReplayError: there is no such block or no such tick, ticks are missing, or a block is to run that acts
+            outside.
         RunError: a block could not be set up.
     """
     graph = graph or recorded.graph
@@ -301,13 +303,24 @@ def _fed(
         for path in run:
             if path not in paths:
                 raise ReplayError(f"there is no block {path!r}; there is {', '.join(paths)}")
+        for path in run:
+            if is_outside(graph.block(path)):
+                raise ReplayError(
+                    f"{path} ({block_name(graph.block(path).block_type)}) acts outside of the graph, and a "
+                    "replay touches nothing there; replay another block"
+                )
         return [path for path in paths if path not in run]
     recorded = inputs == "recorded"
     return [
         spec.path
         for spec in graph.blocks
-        if spec.path in late or (recorded and spec.block_type.outside != "no")
+        if spec.path in late or is_outside(spec) or (recorded and spec.block_type.outside != "no")
     ]
+
+
+def is_outside(spec: BlockSpec) -> bool:
+    """Return whether a block reaches beyond the run: robots, pads, networks, other processes."""
+    return spec.block_type.outside == "real" or spec.block_type.acts_outside
 
 
 def _beginning(recorded: Replayable, first_tick: int | None) -> Snapshot | None:
@@ -347,7 +360,7 @@ def _expect_no_gap(recorded: Replayable, fed: Sequence[str], start: int, end: in
         )
 
 
-class Follower:
+class Follower(Sink):
     """A sink that feeds the blocks that do not run, applies recorded changes of parameters, and compares."""
 
     def __init__(
@@ -393,9 +406,6 @@ class Follower:
                     f"what the keyframe at tick {tick} holds does not fit this graph: state "
                     f"{note}; replay from the beginning"
                 )
-
-    def open(self, bound: BoundGraph) -> None:
-        """No-op: the blocks have not started yet."""
 
     def ready(self) -> None:
         """Restore the keyframe it begins with, and prepare the first tick."""

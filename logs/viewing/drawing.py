@@ -220,7 +220,7 @@ class Moments:
 
 
 class SceneDisplay:
-    """What draws one thing of the scene. ``write_static`` is called once, ``write`` for every batch.
+    """Draws one thing of the scene. ``write_static`` is called once, ``write`` for every batch.
 
     ``scale`` is the factor by which the sizes of marks and lines suit the robot.
     """

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import quaternions_of_matrices
 from ...robots.surfaces import robot_surfaces
-from ...runtime.language.terrain import Ground, HeightField
+from ...robots.terrain import Ground, HeightField
 from ..file.format import EVENTS, WORLD, Header, RecordedRows, time_columns, timed
 from .contacts import (
     ABOVE_GROUND,

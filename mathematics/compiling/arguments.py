@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .failures import FAILURES
 from .machine_code import ENTRY, machine_code_of
 
 HEADER = 2
@@ -128,10 +129,11 @@ def pack(arguments: tuple[Any, ...]) -> NDArray[np.int64]:
 
 @cache
 def error_record() -> NDArray[np.int64]:
-    """Return the record with which machine code reports errors, (3,): whether one was reported, and
-    the addresses of Python's function that sets an error and of the error."""
+    """Return the record with which machine code reports errors: whether one was reported, the status,
+    the address of Python's function that sets an error, and those of the errors, by kind."""
     function = ctypes.cast(ctypes.pythonapi.PyErr_SetString, ctypes.c_void_p).value
-    return np.array([0, function or 0, id(ZeroDivisionError)], np.int64)
+    kinds = [id(error) for error, _ in FAILURES.values()]
+    return np.array([0, 0, function or 0, *kinds], np.int64)
 
 
 @cache
@@ -146,14 +148,15 @@ def _report_module() -> Any:
 
     word, text = ir.IntType(64), ir.IntType(8).as_pointer()
     module = ir.Module("aloft.report")
-    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [word, text]), ENTRY)
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [word, text, word]), ENTRY)
     builder = ir.IRBuilder(function.append_basic_block())
-    record, message = function.args
+    record, message, status = function.args
     words = builder.inttoptr(record, word.as_pointer())
     builder.store(ir.Constant(word, 1), words)
-    address, error = (
-        builder.load(builder.gep(words, [ir.Constant(word, place)])) for place in (1, 2)
-    )
+    builder.store(status, builder.gep(words, [ir.Constant(word, 1)]))
+    address = builder.load(builder.gep(words, [ir.Constant(word, 2)]))
+    kind = builder.add(builder.and_(status, ir.Constant(word, 15)), ir.Constant(word, 3))
+    error = builder.load(builder.gep(words, [kind]))
     set_error = ir.FunctionType(ir.VoidType(), [word, text]).as_pointer()
     builder.call(builder.inttoptr(address, set_error), [error, message])
     builder.ret_void()

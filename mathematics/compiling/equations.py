@@ -22,18 +22,19 @@ import ast
 import copy
 import linecache
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from enum import IntEnum
 from types import CodeType
 from typing import Any
 
+from .array_equations import ArrayEquations
 from .expressions import EquationError as EquationError  # noqa: PLC0414  also imported from here
-from .expressions import Expressions, indices_of
 from .expressions import cross as cross  # noqa: PLC0414
-from .kernel_registry import is_kernel
+from .kernel_registry import is_kernel, written_code
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kinds
+from .slices import Cut, counters_of
 
-VERSION = 1
+VERSION = 2
 """Counts changes of what a statement is rewritten into: machine code made before is not used."""
 
 
@@ -74,7 +75,7 @@ def expanded_definition(function: Any, code: CodeType) -> ast.FunctionDef | None
     (definition,) = (node for node in tree.body if isinstance(node, ast.FunctionDef))
     if function.__closure__ is None:
         rewriter = _Rewriter(function, code.co_filename)
-        definition.body = rewriter.body(definition.body)
+        definition.body = rewriter.rewritten(definition)
     if reports_event(function):
         definition.args.args.append(ast.arg(EVENT))
         none = ast.Assign([_event_place()], ast.Constant(False))
@@ -100,24 +101,36 @@ def _event_place() -> ast.expr:
     return ast.Subscript(ast.Name(EVENT, ast.Load()), ast.Constant(0), ast.Store())
 
 
-class _Rewriter(Expressions):
+class _Rewriter(ArrayEquations):
     """Rewrites the statements of one function, from the first to the last."""
 
     def __init__(self, function: Any, file: str) -> None:
         super().__init__(function, file)
         self._count = 0
         self._products: set[str] = set()
-        """Names of cross products, whose elements are numbers: ``cross_1__0`` and so on."""
+        self._aliases: dict[str, str] = {}
+        self._cuts: dict[str, Cut] = {}
         self._ahead: list[ast.stmt] | None = []
-        """Statements to put in front of the present one; None where none can be put there."""
 
     # Statements
+
+    def rewritten(self, definition: ast.FunctionDef) -> list[ast.stmt]:
+        """Rewrite the body of the function."""
+        constants = {
+            name
+            for name in written_code(self._function).co_names
+            if name not in self._locals
+            and isinstance(self._scope.get(name), int)
+            and self._scope[name] >= 0
+        }
+        self._counters = counters_of(definition) | constants
+        return self.body(definition.body)
 
     def body(self, statements: Sequence[ast.stmt]) -> list[ast.stmt]:
         """Rewrite some statements that follow each other."""
         made: list[ast.stmt] = []
         for statement in statements:
-            outer, self._ahead = self._ahead, []
+            outer, self._ahead, self._cuts = self._ahead, [], {}
             rewritten = self._statement(statement)
             made += [*self._ahead, *rewritten]
             self._ahead = outer
@@ -213,8 +226,7 @@ class _Rewriter(Expressions):
                 ast.Subscript(loaded, ast.Tuple([], ast.Load()), ast.Store()), node
             )
         if isinstance(node, ast.Subscript):
-            node.slice = self._expression(node.slice)
-            node.value = self._inside(node.value)
+            return self._inside(node)
         return node
 
     # Expressions that are one number, or are handed on
@@ -247,14 +259,6 @@ class _Rewriter(Expressions):
             return self._inside(node)
         return self._children(node, self._expression)
 
-    def _children(self, node: ast.expr, visit: Callable[[ast.expr], ast.expr]) -> ast.expr:
-        for field, value in ast.iter_fields(node):
-            if isinstance(value, ast.expr):
-                setattr(node, field, visit(value))
-            elif isinstance(value, list):
-                setattr(node, field, [visit(v) if isinstance(v, ast.expr) else v for v in value])
-        return node
-
     def _reference(self, node: ast.expr) -> ast.expr:
         """Rewrite an expression that may be an array, which is handed on as it is."""
         kind = self._kind(node)
@@ -275,6 +279,7 @@ class _Rewriter(Expressions):
         if isinstance(node, ast.Attribute):
             node.value = self._inside(node.value)
         elif isinstance(node, ast.Subscript):
+            self._kind(node)  # refuses an index beyond the array
             node.slice = self._expression(node.slice)
             node.value = self._inside(node.value)
         return node
@@ -350,237 +355,9 @@ class _Rewriter(Expressions):
                         )
                     each.value = words[0].index(each.value)
 
-    # Equations on arrays
-
-    def _loops(self, node: ast.stmt, target: ast.expr, value: ast.expr) -> list[ast.stmt]:
-        """Write the loops for ``target = value``, where the target is a part of an array."""
-        assert isinstance(target, ast.Subscript)
-        kind = self._kind(target)
-        assert isinstance(kind, ArrayKind)
-        self._check_shapes(node, kind, value)
-        self._check_overlap(node, target, value)
-        unrolled = any(
-            isinstance(each, ast.Call) and self._is_cross(each) for each in ast.walk(value)
-        )
-        if unrolled:
-            value = self._with_cross_products(value)
-        sizes = self._sizes(target)
-        if unrolled:
-            return [
-                ast.copy_location(self._element_statement(target, value, [ast.Constant(k)]), node)
-                for k in range(3)
-            ]  # fmt: skip
-        variables = [self._name("i") for _ in sizes]
-        places: list[ast.expr] = [ast.Name(v, ast.Load()) for v in variables]
-        outer, self._ahead = self._ahead, []
-        inner: ast.stmt = self._element_statement(target, value, places)
-        body = [*self._ahead, inner]
-        self._ahead = outer
-        for variable, size in zip(reversed(variables), reversed(sizes), strict=True):
-            loop = ast.For(
-                ast.Name(variable, ast.Store()), _called("range", size, node), body, [], None
-            )
-            body = [loop]
-        for statement in body:
-            ast.copy_location(statement, node)
-            for each in ast.walk(statement):
-                if not hasattr(each, "lineno"):
-                    ast.copy_location(each, node)
-        return body
-
-    def _element_statement(
-        self, target: ast.expr, value: ast.expr, places: list[ast.expr]
-    ) -> ast.stmt:
-        written = self._part(copy.deepcopy(target), places)
-        assert isinstance(written, ast.Subscript)
-        written.ctx = ast.Store()
-        return ast.Assign([written], self._element(copy.deepcopy(value), places))
-
-    def _element(self, node: ast.expr, places: list[ast.expr]) -> ast.expr:
-        """Return the element of an expression at some places, or the number that it is."""
-        kind = self._kind(node)
-        if not isinstance(kind, ArrayKind) or kind.rank == 0:
-            return self._expression(node)
-        if isinstance(node, ast.Name) and node.id in self._products:
-            assert isinstance(places[0], ast.Constant)
-            return ast.copy_location(ast.Name(f"{node.id}_{places[0].value!r}", ast.Load()), node)
-        if isinstance(node, ast.Name | ast.Attribute | ast.Subscript):
-            if kind.rank < len(places):
-                places = places[len(places) - kind.rank :]
-            part = self._part(node, places)
-            return part if kind.element is bool else _called(kind.element.__name__, part, node)
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult):
-            return self._sum(node, places)
-        if isinstance(node, ast.Call):
-            node.args = [self._element(each, places) for each in node.args]
-            return node
-        return self._children(node, lambda each: self._element(each, places))
-
-    def _part(self, node: ast.expr, places: Sequence[ast.expr]) -> ast.expr:
-        """Return the element of an array, or of a part of one, at some places."""
-        places = [copy.deepcopy(place) for place in places]
-        if isinstance(node, ast.Attribute) and node.attr == "T":
-            return self._part(node.value, places[::-1])
-        indices: list[ast.expr] = []
-        if isinstance(node, ast.Subscript):
-            for index in indices_of(node):
-                if isinstance(index, ast.Slice):
-                    place = places.pop(0)
-                    lower = index.lower
-                    if lower is not None:
-                        place = ast.BinOp(self._expression(copy.deepcopy(lower)), ast.Add(), place)
-                        ast.copy_location(place, node)
-                    indices.append(place)
-                else:
-                    indices.append(self._expression(index))
-            base = node.value
-        else:
-            base = node
-        indices += places
-        base = self._inside(base)
-        index = indices[0] if len(indices) == 1 else ast.Tuple(indices, ast.Load())
-        return ast.copy_location(ast.Subscript(base, index, ast.Load()), node)
-
-    def _sum(self, node: ast.BinOp, places: list[ast.expr]) -> ast.expr:
-        """One element of a product with ``@``: a loop ahead of the statement, and its sum."""
-        if self._ahead is None:
-            raise self._error(
-                node, "a product with @ cannot stand here; assign it to a name before"
-            )
-        left, right = self._kind(node.left), self._kind(node.right)
-        assert isinstance(left, ArrayKind) and isinstance(right, ArrayKind)
-        own = left.rank - 1
-        total = self._name("sum")
-        outer = self._ahead
-
-        def term(j: ast.expr) -> list[ast.stmt]:
-            self._ahead = []
-            a = self._element(copy.deepcopy(node.left), [*places[:own], j])
-            b = self._element(copy.deepcopy(node.right), [j, *places[own:]])
-            product = ast.BinOp(a, ast.Mult(), b)
-            return [*self._ahead, ast.AugAssign(ast.Name(total, ast.Store()), ast.Add(), product)]
-
-        statements: list[ast.stmt] = [ast.Assign([ast.Name(total, ast.Store())], ast.Constant(0.0))]
-        if any(isinstance(each, ast.Name) and each.id in self._products for each in ast.walk(node)):
-            # a cross product is three numbers, which no index finds
-            statements += [each for k in range(3) for each in term(ast.Constant(k))]
-        else:
-            size = self._size_of(node.left, left.rank - 1) or self._size_of(node.right, 0)
-            if size is None:
-                raise self._error(node, "the length of this product is not known")
-            j = self._name("j")
-            within = term(ast.Name(j, ast.Load()))
-            called = _called("range", size, node)
-            statements.append(ast.For(ast.Name(j, ast.Store()), called, within, [], None))
-        self._ahead = outer
-        for statement in statements:
-            for each in ast.walk(statement):
-                if not hasattr(each, "lineno"):
-                    ast.copy_location(each, node)
-            self._ahead.append(statement)
-        return ast.copy_location(ast.Name(total, ast.Load()), node)
-
-    def _with_cross_products(self, value: ast.expr) -> ast.expr:
-        """Replace each cross product in the value by three numbers that are computed ahead."""
-        rewriter = self
-
-        class Products(ast.NodeTransformer):
-            def visit_Call(self, node: ast.Call) -> ast.AST:
-                self.generic_visit(node)
-                if not rewriter._is_cross(node):
-                    return node
-                if len(node.args) != 2 or rewriter._ahead is None:
-                    raise rewriter._error(node, "cross takes two vectors")
-                name = rewriter._name("cross")
-                for k in range(3):
-                    a, b = (k + 1) % 3, (k + 2) % 3
-                    terms = [
-                        ast.BinOp(
-                            rewriter._element(copy.deepcopy(node.args[0]), [ast.Constant(i)]),
-                            ast.Mult(),
-                            rewriter._element(copy.deepcopy(node.args[1]), [ast.Constant(j)]),
-                        )
-                        for i, j in ((a, b), (b, a))
-                    ]
-                    difference = ast.BinOp(terms[0], ast.Sub(), terms[1])
-                    made = ast.Assign([ast.Name(f"{name}_{k}", ast.Store())], difference)
-                    for each in ast.walk(made):
-                        if not hasattr(each, "lineno"):
-                            ast.copy_location(each, node)
-                    rewriter._ahead.append(made)
-                rewriter._kinds[name] = ArrayKind((3,))
-                rewriter._products.add(name)
-                return ast.copy_location(ast.Name(name, ast.Load()), node)
-
-        made: ast.expr = Products().visit(value)
-        return made
-
-    def _sizes(self, target: ast.Subscript) -> list[ast.expr]:
-        """Return the number of elements of a target in each dimension that a loop goes through."""
-        kind = self._kind(target)
-        assert isinstance(kind, ArrayKind)
-        sizes = [self._size_of(target, k) for k in range(kind.rank)]
-        if any(size is None for size in sizes):
-            raise self._error(target, "say where this slice ends")
-        return [size for size in sizes if size is not None]
-
-    # What is refused
-
-    def _check_shapes(self, node: ast.stmt, target: ArrayKind, value: ast.expr) -> None:
-        """Refuse sizes that are known not to fit."""
-        kind = self._kind(value)
-        if isinstance(kind, ArrayKind) and kind.rank > target.rank:
-            raise self._error(
-                node, f"a value of {kind.rank} dimensions does not fit into {target.rank}"
-            )
-        if isinstance(kind, ArrayKind) and kind.rank:
-            pairs = zip(target.shape[::-1], kind.shape[::-1], strict=False)
-            if any(a is not None and b is not None and a != b for a, b in pairs):
-                raise self._error(
-                    node, f"a value of shape {kind.shape} does not fit into {target.shape}"
-                )
-        for each in ast.walk(value):
-            if isinstance(each, ast.BinOp) and isinstance(each.op, ast.MatMult):
-                left, right = self._kind(each.left), self._kind(each.right)
-                for side, found in ((each.left, left), (each.right, right)):
-                    if not isinstance(found, ArrayKind) or not found.rank:
-                        text = "takes arrays whose dimensions are known"
-                        raise self._error(each, f"@ {text}; {ast.unparse(side)} is not one")
-                assert isinstance(left, ArrayKind) and isinstance(right, ArrayKind)
-                sizes = left.shape[-1], right.shape[0]
-                if None not in sizes and sizes[0] != sizes[1]:
-                    raise self._error(
-                        each, f"shapes {left.shape} and {right.shape} have no product"
-                    )
-
-    def _check_overlap(self, node: ast.stmt, target: ast.Subscript, value: ast.expr) -> None:
-        """Refuse a target that the value still reads after it has been written."""
-        base = _path(target)
-        summed = [
-            part
-            for each in ast.walk(value)
-            if isinstance(each, ast.BinOp) and isinstance(each.op, ast.MatMult)
-            for part in ast.walk(each)
-        ]
-        if any(_path(each) == base for each in summed if isinstance(each, ast.expr)):
-            raise self._error(node, f"{base} is written while @ still reads it; use another array")
-        for each in ast.walk(value):
-            if isinstance(each, ast.Subscript) and _path(each) == base:
-                slices = any(isinstance(i, ast.Slice) for i in indices_of(each))
-                if slices and ast.unparse(each.slice) != ast.unparse(target.slice):
-                    raise self._error(node, f"{base} is written while another part of it is read")
-
     def _name(self, stem: str) -> str:
         self._count += 1
         return f"{stem}_{self._count}_"
-
-
-def _path(node: ast.expr) -> str:
-    """Return the array that an expression is, or is a part of, as text; empty where it is
-    neither."""
-    while isinstance(node, ast.Subscript) or (isinstance(node, ast.Attribute) and node.attr == "T"):
-        node = node.value
-    return ast.unparse(node) if isinstance(node, ast.Name | ast.Attribute) else ""
 
 
 def _loaded(node: ast.expr) -> ast.expr:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import ast
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..arrays import Array
+from .kernel_registry import written_code
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kinds
 
 
@@ -31,6 +32,11 @@ class Expressions:
         self._file = file
         self._scope: Mapping[str, Any] = function.__globals__
         self._kinds: dict[str, Kind] = dict(argument_kinds(function))
+        code = written_code(function)
+        self._locals = {*code.co_varnames, *code.co_cellvars, *code.co_freevars}
+        """Names that are the function's own, and not its module's."""
+        self._counters: set[str] = set()
+        """Whole numbers that are never negative: the variables of most loops, and constants."""
 
     def _expression(self, node: ast.expr) -> ast.expr:
         """Rewrite an expression as a number."""
@@ -61,31 +67,64 @@ class Expressions:
         if isinstance(node, ast.BinOp):
             return self._kind_of_operation(node)
         if isinstance(node, ast.UnaryOp):
-            return self._kind(node.operand)
+            kind = self._kind(node.operand)
+            if isinstance(node.op, ast.Not) and isinstance(kind, ArrayKind):
+                return ArrayKind(kind.shape, bool)
+            return kind
         if isinstance(node, ast.IfExp):
-            return self._widest([node.body, node.orelse, node.test])
+            kind = self._joined(node, [node.body, node.orelse, node.test])
+            if kind != NUMBER:
+                return kind
+            # a choice between signals or rows is handed on like one
+            return self._without_number(node.body)
         if isinstance(node, ast.Compare):
-            return self._widest([node.left, *node.comparators])
+            return self._joined(node, [node.left, *node.comparators], bool)
         if isinstance(node, ast.BoolOp):
-            return self._widest(node.values)
+            return self._joined(node, node.values, bool)
         if isinstance(node, ast.Call):
             if self._is_cross(node):
                 return ArrayKind((3,))
-            kinds = [kind for each in node.args if isinstance(kind := self._kind(each), ArrayKind)]
-            if self._applies_to_elements(node) and kinds:
-                return max(kinds, key=lambda kind: kind.rank)
+            if self._applies_to_elements(node):
+                return self._joined(node, node.args)
             return NUMBER
         return NUMBER if isinstance(node, ast.Constant) else None
 
-    def _widest(self, nodes: list[ast.expr]) -> Kind:
-        """Return the kind of what is made of each element of some expressions: an array if one
-        is."""
-        arrays = [kind for each in nodes if isinstance(kind := self._kind(each), ArrayKind)]
+    def _joined(
+        self, node: ast.expr, parts: Sequence[ast.expr], element: type | None = None
+    ) -> Kind:
+        """Return the kind of what is made of each element of some expressions, as NumPy repeats
+        them: an array if one is.
+
+        Raises:
+            EquationError: their sizes do not fit.
+        """
+        arrays = [kind for each in parts if isinstance(kind := self._kind(each), ArrayKind)]
         arrays = [kind for kind in arrays if kind.rank]
-        if arrays:
-            return max(arrays, key=lambda kind: kind.rank)
-        kind = self._kind(nodes[0])
-        return NUMBER if isinstance(kind, ArrayKind) else kind
+        if not arrays:
+            return NUMBER
+        shape = arrays[0].shape
+        for kind in arrays[1:]:
+            shape = self._common_shape(node, shape, kind.shape)
+        if element is None:
+            element = max((kind.element for kind in arrays), key=_WIDTHS.index)
+        return ArrayKind(shape, element)
+
+    def _common_shape(
+        self, node: ast.expr, a: tuple[int | None, ...], b: tuple[int | None, ...]
+    ) -> tuple[int | None, ...]:
+        rank = max(len(a), len(b))
+        made: list[int | None] = []
+        for one, other in zip(
+            (*[1] * (rank - len(a)), *a), (*[1] * (rank - len(b)), *b), strict=True
+        ):
+            if None not in (one, other) and one != other and 1 not in (one, other):
+                raise self._error(node, f"shapes {shown(a)} and {shown(b)} do not fit together")
+            made.append(other if one == 1 or one is None else one)
+        return tuple(made)
+
+    def _without_number(self, node: ast.expr) -> Kind:
+        kind = self._kind(node)
+        return NUMBER if isinstance(kind, ArrayKind) and not kind.rank else kind
 
     def _kind_of_part(self, node: ast.Subscript) -> Kind:
         whole = self._kind(node.value)
@@ -93,15 +132,45 @@ class Expressions:
             return None
         shape: list[int | None] = []
         indices = indices_of(node)
-        for size, index in zip(whole.shape, indices, strict=False):
-            if isinstance(index, ast.Slice):
-                shape.append(_length_of_slice(index, size))
+        if len(indices) > whole.rank:
+            text = f"{ast.unparse(node)}: {len(indices)} indices for {whole.rank} dimensions"
+            raise self._error(node, text)
+        for k, (size, index) in enumerate(zip(whole.shape, indices, strict=False)):
+            if isinstance(index, ast.expr) and not is_slice(index):
+                self._check_index(node, index, size, k)
+            else:
+                shape.append(self._length_of(index, size))
         shape += whole.shape[len(indices) :]
         return ArrayKind(tuple(shape), whole.element) if shape else NUMBER
 
+    def _check_index(self, node: ast.Subscript, index: ast.expr, size: int | None, k: int) -> None:
+        """Refuse an index that is always beyond an array."""
+        place = self._constant_of(index)
+        if place is None or size is None or -size <= place < size:
+            return
+        array = ast.unparse(node.value)
+        where = f" in dimension {k}" if k else ""
+        most = (
+            f"the indices of its {size} elements are {-size} to {size - 1}"
+            if size
+            else "it has no elements"
+        )
+        raise self._error(node, f"{ast.unparse(node)} is beyond {array}{where}: {most}")
+
+    def _length_of(self, part: ast.expr, size: int | None) -> int | None:
+        """Return the length of a slice where it is known."""
+        raise NotImplementedError
+
+    def _constant_of(self, node: ast.expr) -> int | None:
+        """Return the whole number that an expression always is, where that is known."""
+        raise NotImplementedError
+
+    def _cut(self, part: ast.Slice, size: int | None, node: ast.Subscript, dimension: int) -> Any:
+        """Find the places of a slice."""
+        raise NotImplementedError
+
     def _kind_of_operation(self, node: ast.BinOp) -> Kind:
         left, right = self._kind(node.left), self._kind(node.right)
-        arrays = [kind for kind in (left, right) if isinstance(kind, ArrayKind) and kind.rank]
         if (
             isinstance(node.op, ast.MatMult)
             and isinstance(left, ArrayKind)
@@ -109,8 +178,9 @@ class Expressions:
         ):
             shape = left.shape[:-1] + (right.shape[1:] if right.rank > 1 else ())
             return ArrayKind(shape) if shape else NUMBER
-        if arrays:
-            return max(arrays, key=lambda kind: kind.rank)
+        kind = self._joined(node, [node.left, node.right])
+        if isinstance(kind, ArrayKind):
+            return ArrayKind(kind.shape, float) if isinstance(node.op, ast.Div) else kind
         return NUMBER if left is not None and right is not None else None
 
     def _element_type(self, node: ast.expr) -> type | None:
@@ -130,7 +200,7 @@ class Expressions:
         known."""
         if not isinstance(target, ast.Subscript):
             return False
-        if not any(isinstance(index, ast.Slice) for index in indices_of(target)):
+        if not any(is_slice(index) for index in indices_of(target)):
             return False
         return isinstance(self._kind(target.value), ArrayKind)
 
@@ -178,20 +248,15 @@ class Expressions:
         whole = self._kind(node.value)
         assert isinstance(whole, ArrayKind)
         indices = indices_of(node)
-        kept = [
-            k for k in range(whole.rank) if k >= len(indices) or isinstance(indices[k], ast.Slice)
-        ]
+        kept = [k for k in range(whole.rank) if k >= len(indices) or is_slice(indices[k])]
         k = kept[dimension]
-        full = self._size_of(node.value, k)
         if k >= len(indices):
-            return full
-        part = indices[k]
-        assert isinstance(part, ast.Slice)
-        upper = full if part.upper is None else self._expression(copy.deepcopy(part.upper))
-        if upper is None or part.lower is None:
-            return upper
-        lower = self._expression(copy.deepcopy(part.lower))
-        return ast.copy_location(ast.BinOp(upper, ast.Sub(), lower), node)
+            return self._size_of(node.value, k)
+        part: Any = indices[k]
+        if isinstance(part, ast.Slice):
+            part = self._cut(part, whole.shape[k], node, k)
+        length: ast.expr = copy.deepcopy(part.length)
+        return length
 
     def _error(self, node: ast.AST, text: str) -> EquationError:
         where = f"{self._file}:{getattr(node, 'lineno', 0)}"
@@ -205,10 +270,15 @@ def indices_of(node: ast.Subscript) -> list[ast.expr]:
     return list(node.slice.elts) if isinstance(node.slice, ast.Tuple) else [node.slice]
 
 
-def _length_of_slice(part: ast.Slice, size: int | None) -> int | None:
-    lower, upper = part.lower, part.upper
-    first = 0 if lower is None else lower.value if isinstance(lower, ast.Constant) else None
-    last = size if upper is None else upper.value if isinstance(upper, ast.Constant) else None
-    if isinstance(first, int) and isinstance(last, int):
-        return last - first
-    return None
+def is_slice(index: ast.expr) -> bool:
+    """Return whether an index is a slice, or a cut in place of one."""
+    return isinstance(index, ast.Slice) or hasattr(index, "length")
+
+
+def shown(shape: Sequence[int | None]) -> str:
+    """Return a shape as text."""
+    sizes = ["?" if size is None else str(int(size)) for size in shape]
+    return f"({', '.join(sizes)}{',' if len(sizes) == 1 else ''})"
+
+
+_WIDTHS = (bool, int, float)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import hashlib
 import types as python_types
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -11,11 +12,12 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 
 from .arguments import ArgumentType, RecordType
+from .array_code import SIZE_BITS, FunctionCode
+from .failures import Site
 from .known_functions import ELEMENTWISE, FUNCTIONS, write_elements, write_product
 from .llvm_code import (
     BOOL,
     NOTHING,
-    FunctionCode,
     NotCompilable,
     Slice,
     Value,
@@ -37,9 +39,11 @@ class Translated(NamedTuple):
         name: by which others call it.
         text: its definition.
         returns: the type of its result.
-        fails: whether it can report a division by zero.
+        fails: whether it can report a failure.
         callees: the functions of this kind that it calls, by name.
         declared: the declarations of other functions that it calls, by name.
+        function: what it was made of.
+        sites: where it can fail itself; a status tells which of them it was.
     """
 
     name: str
@@ -48,6 +52,8 @@ class Translated(NamedTuple):
     fails: bool
     callees: dict[str, Translated]
     declared: dict[str, str]
+    function: Any = None
+    sites: tuple[Site, ...] = ()
 
 
 Callee = Callable[[Any, tuple[ArgumentType, ...]], Translated | None]
@@ -69,6 +75,7 @@ class ExpressionTranslator:
         callee: Callee,
         types: dict[str, ArgumentType],
         signed: set[str],
+        bits: dict[str, int],
     ) -> None:
         self.grown = False
         self._function = function
@@ -77,7 +84,9 @@ class ExpressionTranslator:
         self._callee = callee
         self._types = types
         self._signed = signed
-        self._code = FunctionCode()
+        self._bits = bits
+        """How many bits the variables of loops may have."""
+        self._code = FunctionCode(origin_of(function))
         self._rooms: dict[str, tuple[str, ...]] = {}
         self._callees: dict[str, Translated] = {}
         self._scope = function.__globals__
@@ -115,6 +124,8 @@ class ExpressionTranslator:
                 return code.operation(type(node.op).__name__, a, b)
             case ast.UnaryOp(op=ast.USub()):
                 return code.negative(self._value(node.operand))
+            case ast.UnaryOp(op=ast.Invert()):
+                return code.inverted(self._value(node.operand))
             case ast.UnaryOp(op=ast.UAdd()):
                 return self._value(node.operand)
             case ast.UnaryOp(op=ast.Not()):
@@ -144,8 +155,10 @@ class ExpressionTranslator:
         if name not in self._rooms:
             raise NotCompilable(f"{name} is read before it is assigned")
         value = self._code.load(self._types[name], self._rooms[name])
-        counts = name in self._only_counters and name not in self._signed
-        return Value(value.type, value.parts, counts=counts) if counts else value
+        if name not in self._only_counters:
+            return value
+        counts, bits = name not in self._signed, self._bits.get(name, 63)
+        return Value(value.type, value.parts, counts=counts, bits=bits)
 
     def _outer(self, node: ast.expr) -> Any:
         """Find a module, function or constant that the kernel's module has.
@@ -202,7 +215,8 @@ class ExpressionTranslator:
                 raise NotCompilable("the place in a tuple is a constant")
             member = whole.members[index.constant]
             is_size = isinstance(node.value, ast.Attribute) and node.value.attr == "shape"
-            return Value(member.type, member.parts, counts=is_size)
+            bits = SIZE_BITS if is_size else 63
+            return Value(member.type, member.parts, counts=is_size, bits=bits)
         numbers = [index for index in indices if isinstance(index, Value)]
         if len(numbers) == len(indices) == whole.array.dimensions:
             return self._code.element(whole, numbers)
@@ -215,12 +229,13 @@ class ExpressionTranslator:
             if not isinstance(part, ast.Slice):
                 made.append(self._value(part))
                 continue
-            if part.step is not None:
-                raise NotCompilable("a slice has no step in a kernel")
-            bounds = (
+            step = None if part.step is None else self._value(part.step).constant
+            if part.step is not None and (not step or not isinstance(step, int)):
+                raise NotCompilable("the step of a slice is a constant, and not zero")
+            first, end = (
                 None if each is None else self._value(each) for each in (part.lower, part.upper)
             )
-            made.append(Slice(*bounds))
+            made.append(Slice(first, end, 1 if step is None else int(step)))
         return made
 
     def _condition(self, node: ast.expr, yes: str, no: str) -> None:
@@ -270,10 +285,16 @@ class ExpressionTranslator:
 
     def _kind_of(self, node: ast.expr) -> ArgumentType:
         """Return the type of an expression, without writing its code."""
-        kept = len(self._code.lines), len(self._code.entry), self._code.reachable
+        code = self._code
+        kept = len(code.lines), len(code.entry), code.reachable, len(code.exits), len(code.sites)
         kind = self._value(node).type
-        del self._code.lines[kept[0] :], self._code.entry[kept[1] :]
-        self._code.reachable = kept[2]
+        del (
+            code.lines[kept[0] :],
+            code.entry[kept[1] :],
+            code.exits[kept[3] :],
+            code.sites[kept[4] :],
+        )
+        code.reachable = kept[2]
         return kind
 
     def _choice(self, node: ast.IfExp) -> Value:
@@ -296,10 +317,14 @@ class ExpressionTranslator:
             raise NotCompilable(f"{ast.unparse(node.func)} is {_NOT_CALLED}")
         function = self._outer(node.func)
         arguments = [self._value(each) for each in node.args]
-        if function in FUNCTIONS:
-            return FUNCTIONS[function](self._code, arguments)
-        if function in ELEMENTWISE:
-            return write_elements(self._code, function, arguments)
+        try:
+            if function in FUNCTIONS:
+                return FUNCTIONS[function](self._code, arguments)
+            if function in ELEMENTWISE:
+                return write_elements(self._code, function, arguments)
+        except (TypeError, ValueError, IndexError) as error:
+            text = f"{ast.unparse(node.func)} takes no {len(arguments)} arguments in a kernel"
+            raise NotCompilable(text) from error
         if function is np.dot:
             return write_product(self._code, arguments)
         if isinstance(function, type) and issubclass(function, tuple):
@@ -322,13 +347,14 @@ class ExpressionTranslator:
         operands += [f"ptr {place}" for place in results]
         status = code.result(f'call i32 @"{made.name}"({", ".join(operands)})')
         if made.fails:
-            code.fail_if(code.result(f"icmp ne i32 {status}, 0"))
+            code.pass_on(status)
         return code.load(made.returns, results) if results else NOTHING
 
     # Places in the source
 
     @contextmanager
     def _placed(self, node: ast.stmt | ast.expr) -> Iterator[None]:
+        self._code.line = getattr(node, "lineno", self._code.line)
         try:
             yield
         except NotCompilable as error:
@@ -338,6 +364,12 @@ class ExpressionTranslator:
         file, line = self._function.__code__.co_filename, getattr(node, "lineno", 0)
         name = f"{self._function.__module__}.{self._function.__qualname__}"
         raise CompileError(f"kernel {name} does not compile: {file}:{line}: {text}")
+
+
+def origin_of(function: Any) -> int:
+    """Return a number of 15 bits by which a status tells the function that has failed."""
+    name = f"{function.__module__}.{function.__qualname__}".encode()
+    return int.from_bytes(hashlib.blake2b(name, digest_size=2).digest(), "big") >> 1
 
 
 _NOT_CALLED = "no kernel, and nothing that kernels may call"

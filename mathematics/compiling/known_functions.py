@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from .llvm_code import BOOL, FLOAT, INT, NOTHING, FunctionCode, NotCompilable, Value, join, number
+from .array_code import FunctionCode
+from .failures import Failure
+from .llvm_code import BOOL, FLOAT, INT, NOTHING, NotCompilable, Value, join, number
 
 Translation = Callable[[FunctionCode, Sequence[Value]], Value]
 """Writes a call with these arguments, and returns its result."""
@@ -26,6 +28,26 @@ def _function(name: str) -> Translation:
         return Value(FLOAT, (code.call(name, "double", *operands),))
 
     return write
+
+
+def _checked(name: str, pole: Failure = Failure.RANGE) -> Translation:
+    """Return a function of ``math``, which reports arguments outside of its domain."""
+    plain = _function(name)
+
+    def write(code: FunctionCode, arguments: Sequence[Value]) -> Value:
+        operands = [code.convert(each, FLOAT) for each in arguments]
+        made = plain(code, operands)
+        code.in_domain(made, operands, pole)
+        return made
+
+    return write
+
+
+def _root(code: FunctionCode, arguments: Sequence[Value]) -> Value:
+    (value,) = (code.convert(each, FLOAT) for each in arguments)
+    if value.constant is None or value.constant < 0.0:
+        code.fail_if(code.result(f"fcmp olt double {value.parts[0]}, 0.0"), Failure.DOMAIN)
+    return _SAME["sqrt"](code, [value])
 
 
 def _to_whole(name: str) -> Translation:
@@ -71,7 +93,7 @@ def _absolute(code: FunctionCode, arguments: Sequence[Value]) -> Value:
     value = code.convert(value, INT)
     below = code.compare("Lt", value, number(0))
     chosen = code.select(below, code.negative(value), value)
-    return Value(INT, chosen.parts, counts=True)
+    return Value(INT, chosen.parts, counts=True, bits=min(value.bits + 1, 63))
 
 
 def _length(code: FunctionCode, arguments: Sequence[Value]) -> Value:
@@ -102,16 +124,27 @@ def _operation(name: str) -> Translation:
 
 
 _FLOOR, _CEILING = "llvm.floor.f64", "llvm.ceil.f64"
-_SAME = {
-    name: _function(f"llvm.{name}.f64")
-    for name in ("sqrt", "sin", "cos", "exp", "log", "exp2", "copysign")
-} | {name: _function(name) for name in ("tan", "sinh", "cosh", "tanh", "log10", "log1p", "expm1")}
-_MATH = _SAME | {
-    name: _function(name)
-    for name in ("asin", "acos", "atan", "atan2", "asinh", "acosh", "atanh", "hypot", "pow", "fmod")
+_LLVM = {
+    name: f"llvm.{name}.f64"
+    for name in ("sqrt", "sin", "cos", "exp", "log", "exp2", "log2", "copysign")
+}
+_SAME = {name: _function(_LLVM[name]) for name in _LLVM if name != "log2"} | {
+    name: _function(name) for name in ("tan", "sinh", "cosh", "tanh", "log10", "log1p", "expm1")
+}
+_POLE = dict.fromkeys(("log", "log2", "log10", "log1p", "atanh"), Failure.DOMAIN)
+_NEVER = ("tanh", "atan", "atan2", "asinh", "copysign")
+_MATH = {
+    name: _function(_LLVM.get(name, name)) if name in _NEVER
+    else _checked(_LLVM.get(name, name), _POLE.get(name, Failure.RANGE))
+    for name in (
+        "sin", "cos", "tan", "exp", "exp2", "log", "log2", "log10", "log1p", "expm1", "sinh", "cosh", "tanh",
+        "asin", "acos", "atan", "atan2", "asinh", "acosh", "atanh", "hypot", "fmod", "copysign",
+    )
 } | {
+    "sqrt": _root, "pow": lambda code, arguments: code.operation(
+        "Pow", *(code.convert(each, FLOAT) for each in arguments)),
     "fabs": lambda code, arguments: _absolute(code, [code.convert(arguments[0], FLOAT)]),
-    "log2": _function("llvm.log2.f64"), "floor": _to_whole(_FLOOR), "ceil": _to_whole(_CEILING),
+    "floor": _to_whole(_FLOOR), "ceil": _to_whole(_CEILING),
     "trunc": _to_whole("llvm.trunc.f64"), "isnan": _is_nan, "isinf": _is_below_infinity("oeq"),
     "isfinite": _is_below_infinity("olt"), "radians": lambda code, arguments: code.operation("Mult", arguments[0], number(math.pi / 180.0)),
     "degrees": lambda code, arguments: code.operation("Mult", arguments[0], number(180.0 / math.pi)),
@@ -171,6 +204,10 @@ def write_product(code: FunctionCode, arguments: Sequence[Value]) -> Value:
     """``np.dot(a, b, out)``; sums go from the first product to the last."""
     a, b, *out = arguments
     if not out:
+        if a.array.dimensions != 1 or b.array.dimensions != 1:
+            raise NotCompilable(
+                "a product of a matrix needs room: assign it into an array, as in out[:] = R @ v"
+            )
         return _sum_of_products(code, a, b, [], [])
     own = a.array.dimensions - 1
 

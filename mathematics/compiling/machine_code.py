@@ -15,7 +15,7 @@ from . import store
 
 ENTRY = "aloft_entry"
 """The name of the only function that the object file of a kernel exports."""
-OPTIONS = "strict floating point, errors as in Python, loops kept, 4"
+OPTIONS = "strict floating point, errors as in Python, loops kept, 5"
 """Options of the compiler; the number at the end counts changes of the calling convention."""
 OLDEST = {
     "x86_64-unknown-linux-gnu": "x86-64",

@@ -13,7 +13,7 @@ from typing import Any
 from .arguments import ArgumentType, NumberType, RecordType
 from .kernel_expressions import Callee, CompileError, ExpressionTranslator, Translated
 from .known_functions import apply
-from .llvm_code import INT, NOTHING, NotCompilable, Value, join, leaves, number
+from .llvm_code import FLOAT, INT, NOTHING, NotCompilable, Value, join, leaves, number
 
 _MOST_PASSES = 12
 
@@ -39,8 +39,9 @@ def translate(
     """
     types: dict[str, ArgumentType] = {}
     signed: set[str] = set()
+    bits: dict[str, int] = {}
     for _ in range(_MOST_PASSES):
-        attempt = _Function(function, tree, signature, callee, types, signed)
+        attempt = _Function(function, tree, signature, callee, types, signed, bits)
         made = attempt.translated(name)
         if not attempt.grown:
             return made
@@ -74,10 +75,12 @@ class _Function(ExpressionTranslator):
         parameters += [f"ptr %r{k}" for k in range(len(leaves(returns)))]
         lines = [f'define internal i32 @"{name}"({", ".join(parameters)}) #0 {{', "entry:"]
         lines += [*code.entry, *code.lines]
-        lines += ["fail:", "  ret i32 1"] if code.fails else []
-        lines += ["}"]
+        lines += [*code.exits, "}"]
         text = "\n".join(lines)
-        return Translated(name, text, returns, code.fails, self._callees, code.declared)
+        sites = tuple(code.sites)
+        return Translated(
+            name, text, returns, code.fails, self._callees, code.declared, self._function, sites
+        )
 
     # Statements
 
@@ -145,8 +148,17 @@ class _Function(ExpressionTranslator):
             self._types[name] = widest
             self.grown = True
             return
+        if widest == FLOAT and value.type == INT:
+            self._code.exact(value)
         if name not in self._rooms:
             self._rooms[name] = self._code.variable(widest)
+        if (
+            name in self._only_counters
+            and value.type == INT
+            and value.bits > self._bits.get(name, 0)
+        ):
+            self._bits[name] = value.bits
+            self.grown = True
         self._code.store(self._code.convert(value, widest), self._rooms[name])
 
     def _target(self, node: ast.Subscript) -> tuple[Value, str | None]:
@@ -209,7 +221,8 @@ class _Function(ExpressionTranslator):
         head, body, after = code.name("head"), code.name("body"), code.name("next")
         otherwise, end = code.name("else"), code.name("end")
         code.label(head)
-        place = Value(INT, code.load(INT, counter).parts, counts=counts)
+        bits = max(start.bits, stop.bits)
+        place = Value(INT, code.load(INT, counter).parts, counts=counts, bits=bits)
         more = code.compare("Lt", place, stop)
         if not upward:
             less = code.compare("Gt", place, stop)

@@ -11,8 +11,9 @@ from typing import Any
 
 from .arguments import HEADER, ArgumentType, ArrayType
 from .equations import expanded_definition
+from .failures import FAILURES, Site
 from .kernel_expressions import CompileError as CompileError  # noqa: PLC0414  also imported from here
-from .kernel_expressions import Translated
+from .kernel_expressions import Translated, origin_of
 from .kernel_registry import is_kernel, written_code
 from .llvm_code import leaves
 from .machine_code import ENTRY, optimised
@@ -63,6 +64,20 @@ class Translator:
         made = [self._translate(kernel, signature) for kernel, signature in kernels]
         return _with_callees(made), made
 
+    def failure(
+        self, kernel: Callable[..., Any], signature: tuple[ArgumentType, ...], status: int
+    ) -> tuple[Any, Site] | None:
+        """Find the function and the site that a status tells; ``None`` where they are not known.
+
+        Raises:
+            CompileError: the kernel does what compiled code cannot.
+        """
+        place = (status >> 4 & 255) - 1
+        for each in _closure([self._translate(kernel, signature)]):
+            if origin_of(each.function) == status >> 12 and 0 <= place < len(each.sites):
+                return each.function, each.sites[place]
+        return None
+
     def _translate(self, kernel: Any, signature: tuple[ArgumentType, ...]) -> Translated:
         key = id(kernel), signature
         if key not in self._translated:
@@ -82,6 +97,15 @@ class Translator:
 
 def _with_callees(made: Sequence[Translated]) -> str:
     """Functions and all that they call, each once, behind what they call of libraries."""
+    functions = _closure(made)
+    declared: dict[str, str] = {}
+    for each in functions:
+        declared |= each.declared
+    return "\n".join((*declared.values(), *(each.text for each in functions)))
+
+
+def _closure(made: Sequence[Translated]) -> list[Translated]:
+    """Return functions and all that they call, each once."""
     functions: dict[str, Translated] = {}
     pending = list(made)
     while pending:
@@ -89,15 +113,13 @@ def _with_callees(made: Sequence[Translated]) -> str:
         if each.name not in functions:
             functions[each.name] = each
             pending += each.callees.values()
-    declared: dict[str, str] = {}
-    for each in functions.values():
-        declared |= each.declared
-    return "\n".join((*declared.values(), *(each.text for each in functions.values())))
+    return list(functions.values())
 
 
 ATTRIBUTES = """\
 attributes #0 = { nounwind }
 attributes #1 = { nounwind willreturn memory(none) }
+attributes #2 = { nobuiltin }
 !0 = !{!"branch_weights", i32 1, i32 4000}"""
 """Attributes that the functions of a module refer to, at its end."""
 
@@ -106,8 +128,8 @@ def _entry_point(made: Translated, name: str, signature: tuple[ArgumentType, ...
     """Write the function that reads the arguments from the words at an address and calls the
     kernel.
 
-    A kernel raises no errors of its own; if one divides by zero, the entry point sets Python's
-    error, and the caller raises it.
+    A kernel raises no errors of its own; if one fails, the entry point sets Python's error, and the
+    caller raises it.
     """
     lines: list[str] = []
     operands: list[str] = []
@@ -146,11 +168,22 @@ def _entry_point(made: Translated, name: str, signature: tuple[ArgumentType, ...
     for k, leaf in enumerate(leaves(made.returns)):
         lines.append(f"  %r{k} = alloca {leaf}")
         operands.append(f"ptr %r{k}")
-    text = f"compiled kernel {name} divided by zero\0".encode()
-    letters = "".join(f"\\{octet:02x}" for octet in text)
+    kinds = sorted({site.failure for each in _closure([made]) for site in each.sites})
+    messages, cases, blocks = [], [], []
+    for failure in kinds:
+        _, said = FAILURES[failure]
+        text = f"compiled kernel {name} {said}\0".encode()
+        letters = "".join(f"\\{octet:02x}" for octet in text)
+        messages.append(f'@message{failure:d} = internal constant [{len(text)} x i8] c"{letters}"')
+        cases.append(f"i32 {failure:d}, label %fail{failure:d}")
+        blocks += [
+            f"fail{failure:d}:",
+            f"  call void %report(i64 %record, ptr @message{failure:d}, i64 %code)",
+            "  ret void",
+        ]
     return "\n".join(
         (
-            f'@message = internal constant [{len(text)} x i8] c"{letters}"',
+            *messages,
             f"define void @{ENTRY}(i64 %address) #0 {{",
             "  %words = inttoptr i64 %address to ptr",
             *lines,
@@ -161,8 +194,10 @@ def _entry_point(made: Translated, name: str, signature: tuple[ArgumentType, ...
             "  %report = load ptr, ptr %words",
             "  %second = getelementptr i64, ptr %words, i64 1",
             "  %record = load i64, ptr %second",
-            "  call void %report(i64 %record, ptr @message)",
-            "  br label %done",
+            "  %code = zext i32 %status to i64",
+            "  %kind = and i32 %status, 15",
+            f"  switch i32 %kind, label %done [ {' '.join(cases)} ]",
+            *blocks,
             "done:",
             "  ret void",
             "}",

@@ -162,7 +162,7 @@ def task_done(e: Evidence) -> Iterator[PlanTestResult]:
     goals = np.array([(place.x, place.y, place.z) for place in places[1:]])
     missed_by = np.abs(r.soles[standing].mean(axis=1) - goals)
     jump, axis = worst(missed_by)
-    yield PlanTestResult("landing_place", missed_by.max(), 3 * MILLIMETRE, "m", "the feet's distance from it",
+    yield PlanTestResult("landing_position", missed_by.max(), 3 * MILLIMETRE, "m", "the feet's distance from it",
                 "xyz"[axis] + _which(e, jump))  # fmt: skip
     pitch, yaw = e.turn
     turned = (r.heading[standing] - r.heading[0]).mean(axis=1)

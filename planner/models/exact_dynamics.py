@@ -26,7 +26,7 @@ from ...mathematics.whole_body_motion import (
     evaluate_motion,
     follow_turns,
     motion_memory,
-    place_at_instants,
+    set_poses_at_instants,
     turn_memory,
 )
 from ...robots.description import RobotDescription
@@ -315,7 +315,7 @@ class ExactDynamics:
         rotation = np.zeros((*place.shape[:2], 9))
         run_compiled(
             KernelCall(
-                place_at_instants, self._tree, np.ascontiguousarray(position), self._memory.motion, place, rotation,
+                set_poses_at_instants, self._tree, np.ascontiguousarray(position), self._memory.motion, place, rotation,
             )
         )  # fmt: skip
         return LinkPoses(self._links, place, rotation.reshape(*place.shape, 3))

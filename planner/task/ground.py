@@ -101,7 +101,7 @@ def scene_of(task: JumpTask, robot: RobotDescription) -> Any:
         if ground.axis != axis:
             raise JumpTaskError(
                 f"{task.name}: landing_height: one jump has its step ahead and another aside; "
-                "describe the ground yourself: robot.scene"
+                "describe the ground yourself: robot.ground.scene"
             )
         if changes:
             ground = ground.with_edge(at, forward, places[number + 1])
@@ -154,7 +154,7 @@ def _edge(task: JumpTask, hop: Hop, start: StanceLocation) -> tuple[int, float, 
     if hop.gap:
         raise JumpTaskError(
             f"{task.name}: gap: it jumps {abs(ahead):g} m ahead, and cannot pass a gap of {hop.gap:g} m; "
-            "give a longer distance_x, or describe the ground yourself: robot.scene"
+            "give a longer distance_x, or describe the ground yourself: robot.ground.scene"
         )
     if start.slope != (hop.landing_slope or LEVEL):
         raise JumpTaskError(
@@ -164,7 +164,7 @@ def _edge(task: JumpTask, hop: Hop, start: StanceLocation) -> tuple[int, float, 
     raise JumpTaskError(
         f"{task.name}: landing_height: it lands {hop.landing_height:g} m higher or lower where it "
         "stood, and no such ground can be built; give a distance_x, or describe it yourself: "
-        "robot.scene"
+        "robot.ground.scene"
     )
 
 
@@ -177,7 +177,7 @@ def _require_ground(task: JumpTask, robot: RobotDescription, ground: _Edges) -> 
                 raise JumpTaskError(
                     f"{task.name}: landing_height: at place {number} a foot at ({x:.3f}, {y:.3f}) m "
                     f"needs ground at {wanted:g} m, and the steps of the task put it at {found:g} "
-                    "m; move step_edge, narrow the gap, jump farther, or describe the ground yourself: robot.scene"
+                    "m; move step_edge, narrow the gap, jump farther, or describe the ground yourself: robot.ground.scene"
                 )
 
 

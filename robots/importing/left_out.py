@@ -49,7 +49,7 @@ def _contacts(model: Any) -> Iterator[str]:
     slide = given(model.geom_friction[:, :1], FRICTION[:1])
     if slide:
         yield (
-            f"left out: friction coefficient {slide}; friction is the ground's, robot.friction in a "
+            f"left out: friction coefficient {slide}; friction is the ground's, robot.ground.friction in a "
             "graph or trial"
         )
     twist = given(model.geom_friction[:, 1:], FRICTION[1:])
@@ -63,7 +63,7 @@ def _contacts(model: Any) -> Iterator[str]:
     solref, solimp = given(model.geom_solref, SOLREF), given(model.geom_solimp, SOLIMP)
     if solref:
         yield (
-            f"left out: softness of contacts, solref {solref}; robot.soles in a graph or "
+            f"left out: softness of contacts, solref {solref}; robot.ground.soles in a graph or "
             "trial makes soles soft"
         )
     if solimp:

@@ -82,13 +82,13 @@ def _contacts(said: list[Said]) -> Iterator[str]:
     """Yield the contact parameters, by value."""
     friction = _values(said, FRICTION, FRICTION.get)
     if friction:
-        yield f"left out: friction coefficient {friction}; friction is the ground's, robot.friction in a graph or trial"
+        yield f"left out: friction coefficient {friction}; friction is the ground's, robot.ground.friction in a graph or trial"
     twist = _values(said, TWIST)
     if twist:
         yield f"left out: {twist}; contacts here have normal force and sliding friction, condim 3"
     soft = _values(said, SOFT)
     if soft:
-        yield f"left out: softness of contacts, {soft}; robot.soles in a graph or trial makes soles soft"
+        yield f"left out: softness of contacts, {soft}; robot.ground.soles in a graph or trial makes soles soft"
     bounce = _values(said, BOUNCE)
     if bounce:
         yield f"left out: {bounce}; how contacts bounce is the simulator's own for all"

@@ -30,8 +30,8 @@ from ..language.quantities import InputQuantities, OutputQuantities
 from ..language.registry import block_name
 from ..language.signals import Field, Signal
 from ..language.stages import ClockSpec, WhenLate
-from ..running.sinks import Note
-from ..running.ticker import Ticker
+from ..running.sink import Note
+from ..running.ticker import Ticker, WorkerBlock
 from ..running.timing import KEPT_TICKS, BlockTimes, times_of
 from .job_memory import Copies, copies, copy, record_size
 from .worker import views
@@ -58,7 +58,7 @@ class Background:
     initial: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
 
-class BackgroundBlock(Block):
+class BackgroundBlock(WorkerBlock):
     """Stands for a block that works in the background; see the module's text.
 
     Subclasses made by ``background_block_type`` have the ports, states and parameters of the block, and
@@ -91,14 +91,14 @@ class BackgroundBlock(Block):
 
     @classmethod
     def dimensions(cls, params: Parameters, robot: RobotDescription | None) -> Mapping[str, int]:
-        """Those of the block."""
+        """Return the block\'s dimensions."""
         return cls._block_type.dimensions(params, robot)
 
     @classmethod
     def state_dimensions(
         cls, params: Parameters, robot: RobotDescription | None
     ) -> Mapping[str, int]:
-        """Those of the block."""
+        """Return the block\'s dimensions of state."""
         return cls._block_type.state_dimensions(params, robot)
 
     @classmethod
@@ -113,19 +113,19 @@ class BackgroundBlock(Block):
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """Those of the block."""
+        """Return the block\'s quantities of outputs."""
         return cls._block_type.infer_units(params, inputs)
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
-        """Those of the block."""
+        """Return the block\'s example parameters."""
         return cls._block_type.example_parameters()
 
     @classmethod
     def example_inputs(
         cls, rng: np.random.Generator, dimensions: Mapping[str, int]
     ) -> Mapping[str, Mapping[str, Any]]:
-        """Those of the block."""
+        """Return the block\'s example inputs."""
         return cls._block_type.example_inputs(rng, dimensions)
 
     def setup(self) -> None:
@@ -143,6 +143,7 @@ class BackgroundBlock(Block):
         jobs = getattr(self, JOBS)
         self._sampled, self._marks = jobs.sampled.data, jobs.marks.data
         jobs.sampled[:] = jobs.marks[:] = -1
+        self._blank = [np.array(each) for each in self._outputs]
         for port, values in self._background.initial.items():
             for name, value in values.items():
                 getattr(self, port).views()[name][...] = value
@@ -188,7 +189,7 @@ class BackgroundBlock(Block):
             self._sampling.append(copies(targets, [*self._inputs, *self._inputs]))
         rows = [memory.results(slot, results) for slot in range(self._slots + 1)]
         self._showing = [copies(results, row) for row in rows[:-1]]
-        self._zeroing = copies(self._outputs, [np.zeros_like(each) for each in self._outputs])
+        self._zeroing = copies(self._outputs, self._blank)
         self._handing_over = copies(rows[-1], results)
         if self._restored:
             self.load_state()
@@ -348,12 +349,12 @@ class BackgroundBlock(Block):
         self._metrics, self._warnings = worker.end(seconds) or ({}, (STILL_COMPUTING,))
 
     def metrics(self) -> Mapping[str, Metric]:
-        """Those of the block, and in real time how many results were late."""
+        """Return the block's metrics, and in real time the number of late results."""
         late = {"late_results": self._late} if self._in_real_time else {}
         return {**self._metrics, **late}
 
     def warnings(self) -> Sequence[str]:
-        """Those of the block, when the run is over."""
+        """Return the block's warnings, after the end of the run."""
         return self._warnings
 
     def worker_times(self) -> BlockTimes:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 _PORTS = ("Input", "Output")
 _MACHINE = ("step", "emit")
+_PACKAGE = Path(__file__).parents[2]
 _MOST_FILES = 300
 """Largest number of files of a user's folder that are read in order to propose names."""
 
@@ -42,7 +43,7 @@ def classes_in(path: Path) -> tuple[WrittenClass, ...]:
 
 
 def blocks_in_packages(packages: Mapping[str, Path]) -> Mapping[str, Path]:
-    """The blocks that graphs can use as ``package.Class``, with their files, sorted by name.
+    """Find the blocks that graphs can use as ``package.Class``, with their files, sorted by name.
 
     A class is a block if it derives from ``Block`` or ``KernelBlock``, also through other classes.
     It can be used if it has or inherits a port and one of the methods ``step`` and ``emit``, it is
@@ -135,3 +136,26 @@ def _last_name(node: ast.expr) -> str:
     if isinstance(node, ast.Attribute):
         return node.attr
     return node.id if isinstance(node, ast.Name) else ""
+
+
+def imported_files(file: Path, root: Path) -> Iterator[Path]:
+    """Yield the files below ``root`` that a module imports, with the packages they are in."""
+    try:
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+    except (OSError, SyntaxError, ValueError, RecursionError):
+        return
+    for node in ast.walk(tree):
+        names: list[str] = []
+        base = root
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = file.parents[node.level - 1] if node.level else root
+            module = node.module or ""
+            names = [module, *(f"{module}.{alias.name}".strip(".") for alias in node.names)]
+        for name in filter(None, names):
+            parts = name.split(".")
+            places = [base.joinpath(*parts[:k], "__init__.py") for k in range(1, len(parts) + 1)]
+            for place in (*places, base.joinpath(*parts).with_suffix(".py")):
+                if place.is_file() and place.is_relative_to(root) and _PACKAGE not in place.parents:
+                    yield place

@@ -55,7 +55,8 @@ class Context:
     holds the sizes of all dimensions that the block can use, and ``wired`` names its wired inputs.
     ``folder`` is the folder of the graph file that has the block in it: files that a parameter
     names are relative to it. ``graph_folder`` is the folder of the graph that was loaded, beside
-    which users keep their modules.
+    which users keep their modules. ``duration`` is that of a run as the graph gives it [s]; it is
+    known to ``requires`` only, and ``None`` where the graph gives none.
 
     During ``exported_values``, and only then, ``asked`` names the values that other blocks ask for, and
     ``graph`` has the entry of every block in the flattened graph, by its path: ``use``, ``with``,
@@ -71,6 +72,7 @@ class Context:
     wired: tuple[str, ...] = ()
     folder: Path = Path()
     graph_folder: Path = Path()
+    duration: float | None = None
     asked: frozenset[str] = frozenset()
     graph: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 

@@ -20,7 +20,8 @@ class DelayParameters(Parameters):
     """The parameters of every delay."""
 
     initial: Mapping[str, Any] = parameter(
-        {}, text="the outputs of the first runs, by field: numbers or nested lists; otherwise zero"
+        {},
+        text="the outputs of the first runs, by field: numbers or nested lists; otherwise zero, and the identity of quaternions",
     )
 
 
@@ -146,7 +147,7 @@ def ring_signal(signal: type[Signal], k: int) -> type[Signal]:
     entries = {
         name: Field(
             (k, *field.shape), dtype=field.dtype_name, frame=field.frame, text=field.text,
-            ring="ring_position.oldest",
+            ring="ring_position.oldest", quaternion=field.quaternion,
         )
         for name, field in signal.fields.items()
     }  # fmt: skip

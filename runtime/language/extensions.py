@@ -21,6 +21,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from ... import __version__
 from .errors import AloftError
 
 DECLARATION = "extension.toml"
@@ -51,7 +52,13 @@ SERVICES: Mapping[str, str] = {
     "mcap_channels": "ros2",
     "study_paper": "lab",
 }
-"""What the core asks of extensions, and which of aloft's has it."""
+"""Services that the core requests from extensions, each with the extension of aloft that has it."""
+
+FROM_SOURCE = f"""install aloft from its source instead:
+    pip download --no-deps --no-binary :all: aloft-robotics=={__version__}
+    tar xzf aloft_robotics-{__version__}.tar.gz
+    pip install --editable aloft_robotics-{__version__}
+or, in a clone of the repository: pip install --editable ."""
 
 _PACKAGE = __name__.rpartition(".runtime.")[0]
 _ROOT = Path(__file__).parents[2]
@@ -116,7 +123,7 @@ _EXPECTED = {str: "a text", list: "a list of texts", dict: "a table of texts"}
 
 @cache
 def own_extensions() -> Mapping[str, Extension]:
-    """The extensions that lie in this installation of aloft, by name."""
+    """Return the extensions that lie in this installation of aloft, by name."""
     return {
         name: read_declaration(name, folder, f"{_PACKAGE}.{'.'.join(parts)}")
         for name in SHIPPED
@@ -128,7 +135,7 @@ def own_extensions() -> Mapping[str, Extension]:
 
 @cache
 def other_extensions() -> Mapping[str, Extension]:
-    """The extensions of other installed packages, by name.
+    """Return the extensions of other installed packages, by name.
 
     Raises:
         ExtensionError: a package cannot be found, or its declaration is missing or wrong.
@@ -144,7 +151,8 @@ def other_extensions() -> Mapping[str, Extension]:
 
 
 def extension(name: str) -> Extension | None:
-    """The extension of that name, or None; other packages are searched only if aloft has none."""
+    """Return the extension of that name, or None; other packages are searched only if aloft has
+    none."""
     return own_extensions().get(name) or other_extensions().get(name)
 
 
@@ -155,11 +163,9 @@ def extensions() -> Iterator[Extension]:
 
 
 def missing_extension(name: str, what: str) -> str:
-    """The sentence that says which extension has what is not there."""
+    """Return the sentence that names the extension of a missing thing."""
     if name == "lab":
-        return (
-            f"{what} is part of the lab, which only a checkout of the repository has, not a wheel"
-        )
+        return f"{what} is part of the lab, which is not in the wheel; {FROM_SOURCE}"
     return (
         f"{what} is part of the extension {name!r}, which is not here: its folder extensions/{name} is missing; "
         "install aloft-robotics again to have it back"

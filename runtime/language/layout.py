@@ -7,7 +7,7 @@ bytes and is packed inside. The floats lie together so that one call checks that
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,9 +42,11 @@ class Layout:
     """The byte at which each section starts, from the start of the buffer."""
     size: int
     """The size of the whole buffer in bytes, a multiple of 64."""
+    quaternions: tuple[str, ...] = ()
+    """The slots of quaternions, which are the identity before their first value."""
 
     @classmethod
-    def of(cls, ports: Iterable[PortLayout]) -> Layout:
+    def of(cls, ports: Sequence[PortLayout]) -> Layout:
         """Lay out all fields of ``ports``, in their order, section by section.
 
         Raises:
@@ -69,11 +71,17 @@ class Layout:
                 slots[full_name] = slot
                 lengths[field.dtype_name] += slot.size
         offsets: dict[str, int] = {}
+        quaternions = [
+            f"{port.name}.{name}"
+            for port in ports
+            for name, field in port.signal.fields.items()
+            if field.quaternion
+        ]
         size = 0
         for section, length in lengths.items():
             offsets[section] = size
             size += -(-length * DTYPES[section].itemsize // ALIGNMENT) * ALIGNMENT
-        return cls(slots, lengths, offsets, size)
+        return cls(slots, lengths, offsets, size, tuple(quaternions))
 
     def locate(self, section: str, index: int) -> str:
         """Return the name of one element of a section, ``block.port.field[index]``.

@@ -7,7 +7,7 @@ the same dimension: ``force: 70 N``, ``duration: 10 ms``.
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args, get_origin
 
@@ -60,6 +60,38 @@ def is_live(info: FieldInfo) -> bool:
     """Return whether a parameter was declared as one that may change while the graph runs."""
     extra = info.json_schema_extra
     return isinstance(extra, dict) and bool(extra.get("live", False))
+
+
+def group_of(info: FieldInfo) -> type[Parameters] | None:
+    """Return the model of a parameter that is a group of parameters, or may be left out as one."""
+    kinds = [
+        kind for kind in get_args(info.annotation) or (info.annotation,) if kind is not type(None)
+    ]
+    only = kinds[0] if len(kinds) == 1 else None
+    return only if isinstance(only, type) and issubclass(only, Parameters) else None
+
+
+def declared_fields(model: type[Parameters], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
+    """Yield the parameters of a model and of its groups, by path: ``sensors.imu.bandwidth``.
+
+    A group that may be left out stands before what is in it.
+    """
+    for name, info in model.model_fields.items():
+        group = group_of(info)
+        if group is None or type(None) in get_args(info.annotation):
+            yield f"{prefix}{name}", info
+        if group is not None:
+            yield from declared_fields(group, f"{prefix}{name}.")
+
+
+def given_values(params: Parameters, prefix: str = "") -> Iterator[tuple[str, Any, FieldInfo]]:
+    """Yield the values of parameters and of the groups in them, by path, each with its declaration."""
+    for name, info in type(params).model_fields.items():
+        value = getattr(params, name)
+        if isinstance(value, Parameters):
+            yield from given_values(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value, info
 
 
 def takes_none(info: FieldInfo) -> bool:

@@ -16,7 +16,7 @@ from pydantic_core import PydanticUndefined
 
 from ...files.validation import unit_of
 from .block import Block, Input, Output, Port
-from .parameters import is_live
+from .parameters import declared_fields, is_live
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def block_reference(name: str, block_type: type[Block]) -> BlockReference:
         outputs=tuple(_port(port) for port in block_type.outputs.values()),
         states=tuple(_port(port) for port in block_type.states.values()),
         parameters=tuple(
-            _parameter(name, info) for name, info in block_type.Params.model_fields.items()
+            _parameter(name, info) for name, info in declared_fields(block_type.Params)
         ),
     )
 

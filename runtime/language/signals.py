@@ -67,10 +67,12 @@ class Field:
             any, and ``Block.infer_units`` returns those of an output.
         ring: of a state that is a ring buffer along its first axis: the field with the place of its
             oldest entry, ``name`` of the same signal or ``state.name`` of the same block.
+        quaternion: the last dimension is a unit quaternion x, y, z, w, which is the identity before its first
+            value. Other fields are zero before it.
 
     Raises:
         DeclarationError: the dtype or the unit is unknown, a size is not positive, or an inferred
-            field has a unit or a frame of its own.
+            field has a unit or a frame of its own, or a quaternion has another shape.
     """
 
     def __init__(
@@ -84,6 +86,7 @@ class Field:
         values: type[IntEnum] | None = None,
         inferred: bool = False,
         ring: str = "",
+        quaternion: bool = False,
     ) -> None:
         self.shape: tuple[Dimension, ...] = shape if isinstance(shape, tuple) else (shape,)
         if dtype not in DTYPES:
@@ -101,6 +104,9 @@ class Field:
             raise DeclarationError("an inferred field has no unit and no frame of its own")
         self.inferred = inferred
         self.ring = ring
+        if quaternion and (dtype != "float64" or self.shape[-1:] != (4,)):
+            raise DeclarationError(f"a quaternion has 4 floats last, not {dtype} {self.shape}")
+        self.quaternion = quaternion
         self.name = ""
 
     def __set_name__(self, owner: type, name: str) -> None:
@@ -129,6 +135,13 @@ class Field:
             KeyError: a dimension's name is not in ``dimensions``.
         """
         return tuple(size if isinstance(size, int) else dimensions[size] for size in self.shape)
+
+    def blank(self, shape: tuple[int, ...]) -> NDArray[Any]:
+        """Return an array of a resolved shape as it is before the first value."""
+        values = np.zeros(shape, self.dtype)
+        if self.quaternion:
+            values[..., 3] = 1.0
+        return values
 
     def describe(self) -> str:
         """Return the field's type in one line, e.g. ``float64[n_joints] rad``."""
@@ -194,9 +207,10 @@ class Signal:
 
     @classmethod
     def allocate(cls, dimensions: Mapping[str, int] | None = None) -> Self:
-        """Return a free-standing zeroed instance with memory of its own, for tests and tools."""
+        """Return a free-standing instance before its first value, with memory of its own, for tests and
+        tools."""
         sizes = dimensions or {}
-        return cls.bind({n: np.zeros(f.resolve(sizes), f.dtype) for n, f in cls.fields.items()})
+        return cls.bind({n: f.blank(f.resolve(sizes)) for n, f in cls.fields.items()})
 
     def views(self) -> Mapping[str, NDArray[Any]]:
         """Return the arrays by field name, in the order of declaration."""

@@ -22,8 +22,7 @@ from ..language.parameters import Parameters
 from ..loading.checking.parameters import adjust
 from ..running.failures import describe
 from ..running.live_parameters import LiveParameters
-from ..running.memory import BoundGraph
-from ..running.sinks import Note
+from ..running.sink import Note, Sink
 from ..transports.transport import MessageCallback, Transport, tick_key
 from .command_watch import CommandWatch
 from .free_link import LatestReceiver
@@ -419,15 +418,12 @@ class LockstepCoordinator(Block):
                 self._links.transport.close()
 
 
-class FaultReporter:
+class FaultReporter(Sink):
     """The sink through which a coordinator receives faults in its own part."""
 
     def __init__(self, coordinator: LockstepCoordinator) -> None:
         self._coordinator = coordinator
         self._last = -1
-
-    def open(self, bound: BoundGraph) -> None:
-        """Do nothing."""
 
     def record(self, tick: int) -> None:
         """Remember which tick was recorded last."""
@@ -437,9 +433,6 @@ class FaultReporter:
         """Pass on a fault."""
         if note.kind == "fault":
             self._coordinator.report_fault(note, self._last)
-
-    def close(self) -> None:
-        """Do nothing."""
 
 
 class StartBarrier(Block):

@@ -123,7 +123,6 @@ class LatestReceiver:
         self._sequence = -1
         self._shown: Message | None = None
         self._since = 0
-        self._zeros = memoryview(bytes(link.payload))
         self._ages: NDArray[np.int64] = np.zeros(KEPT, np.int64)
         self._count = 0
 
@@ -171,7 +170,7 @@ class LatestReceiver:
         if late:
             self.late_ticks += 1
             if self.policy.late == "safe":
-                self._reader.write_outputs(self._zeros)
+                self._reader.write_outputs(self._reader.initial)
                 self._shown = None  # once it is in time again, it is written again
             elif self.policy.late == "stop":
                 self._stop(

@@ -54,7 +54,7 @@ def schema_of(link: MachineLink) -> bytes:
 
 
 @dataclass(frozen=True)
-class Span:
+class FieldSpan:
     """A stretch of bytes that lies without a gap in the bus and in the payload."""
 
     bus: int
@@ -62,21 +62,21 @@ class Span:
     size: int
 
 
-def spans_of(link: MachineLink, layout: Layout) -> tuple[Span, ...]:
+def spans_of(link: MachineLink, layout: Layout) -> tuple[FieldSpan, ...]:
     """Return the stretches of a link's fields in the bus; neighbouring fields are one stretch.
 
     The fields of a port that have one type are neighbours, so a port with fields of one type that
     are all read is one copy.
     """
     places = sorted(layout.byte_range(field.name) for field in link.fields)
-    spans: list[Span] = []
+    spans: list[FieldSpan] = []
     used = 0
     for first, last in places:
         if spans and spans[-1].bus + spans[-1].size == first:
             before = spans.pop()
-            spans.append(Span(before.bus, before.payload, before.size + last - first))
+            spans.append(FieldSpan(before.bus, before.payload, before.size + last - first))
         else:
-            spans.append(Span(first, used, last - first))
+            spans.append(FieldSpan(first, used, last - first))
         used += last - first
     return tuple(spans)
 
@@ -119,6 +119,8 @@ class MessageReader:
         self._schema = schema_of(link)
         self._length = HEADER + link.payload
         self._size = link.payload
+        self.initial = self._payload()
+        """The payload that the bus has before the first message."""
         self.run = bytes(8)
         """Run that messages must belong to; set by the handshake."""
 
@@ -141,6 +143,12 @@ class MessageReader:
         if run != self.run:
             raise DamagedMessageError(f"it is of run {run.hex()}, expected {self.run.hex()}")
         return Message(sequence, tick, time, view[HEADER:])
+
+    def _payload(self) -> memoryview:
+        found = bytearray(self._size)
+        for source, first, last in self._spans:
+            found[first:last] = source
+        return memoryview(bytes(found))
 
     def write_outputs(self, payload: memoryview) -> None:
         """Write a payload into the bus."""

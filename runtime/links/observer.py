@@ -20,7 +20,7 @@ from zlib import crc32
 
 from ..placement.placed import PlacedGraph
 from ..running.memory import BoundGraph
-from ..running.sinks import Note
+from ..running.sink import Note, Sink
 from ..transports.registry import network_transport, silent_endpoint
 from ..transports.transport import MessageCallback, Transport, rows_key, status_key, window_key
 from .free_link import LatestReceiver
@@ -36,7 +36,7 @@ _HEAD = Struct("<I8sq")
 ROW_HEADER = _HEAD.size
 
 
-class StatusPublisher:
+class StatusPublisher(Sink):
     """The sink that shows one part.
 
     Args:

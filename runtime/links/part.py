@@ -23,7 +23,7 @@ from ..placement.placed import MachineLink, PlacedGraph
 from ..running.executor import Executor
 from ..running.memory import BoundGraph
 from ..running.run_result import RunResult
-from ..running.sinks import Sink
+from ..running.sink import Sink
 from ..transports.transport import Transport, data_key
 from .command_watch import CommandWatch
 from .coordinator import (

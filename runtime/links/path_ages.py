@@ -14,6 +14,7 @@ from ..language.stages import CheckedGraph
 from ..placement.age import LinkTimes, Timeline, measured_ages
 from ..placement.placed import PlacedGraph
 from ..running.memory import BoundGraph
+from ..running.sink import Sink
 from .free_link import TICK_TIME, health_path
 
 MAX_TICKS = 20_000
@@ -32,7 +33,7 @@ def path_sinks(graph: CheckedGraph, kind: str = "") -> list[PathAges]:
     return [] if virtual or not graph.links.paths else [PathAges(graph)]
 
 
-class PathAges:
+class PathAges(Sink):
     """The sink that keeps when ticks began, and judges at the end of the run.
 
     Args:
@@ -61,9 +62,6 @@ class PathAges:
     def resume(self, tick: int) -> None:
         """Begin anew: the time of a pause is no age."""
         self._count = 0
-
-    def close(self) -> None:
-        """Do nothing."""
 
     def metrics(self) -> Mapping[str, Metric]:
         """Return the ages, and whether they were allowed."""

@@ -35,6 +35,7 @@ from ..running.live_parameters import LiveParameters
 from ..running.memory import BoundGraph
 from ..running.run_control import RunControl, refusal_of
 from ..running.run_result import RunResult
+from ..running.sink import Sink
 from ..running.ticker import Ticker
 from .window import Window, digest
 
@@ -51,7 +52,7 @@ class EndpointError(AloftError):
     """A running graph cannot be reached, or its endpoint cannot be opened."""
 
 
-class ParameterEndpoint:
+class ParameterEndpoint(Sink):
     """Answers requests about a graph while it runs; give it to a run as a sink.
 
     Args:

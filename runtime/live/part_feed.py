@@ -19,7 +19,7 @@ from zlib import crc32
 
 from ..running.memory import BoundGraph
 from ..running.run_result import RunResult
-from ..running.sinks import Note
+from ..running.sink import Note, Sink
 from ..running.ticker import Ticker
 from ..transports.transport import MessageCallback, Transport, window_key
 from .window import Window, WindowContents, WindowLayout, WindowReader, digest, parse_window
@@ -33,7 +33,7 @@ LONGEST = 1 << 26
 """Bytes of a message that is read at most."""
 
 
-class PartFeed:
+class PartFeed(Sink):
     """The sink that sends the window of one part.
 
     Args:

@@ -75,8 +75,11 @@ def _particular_schema(name: str, block_type: type[Block], definitions: Schema) 
     for inner, schema in model.pop("$defs", {}).items():
         inside = definitions[f"{name}.{inner}"] = _relocate(schema, name)
         for key, value in inside.get("properties", {}).items():
+            value.pop("live", None)
+            options = [value, _EXPORTED]
             if value.pop("unit", ""):
-                inside["properties"][key] = {"anyOf": [value, *_quantity(value)]}
+                options += _quantity(value)
+            inside["properties"][key] = {"anyOf": options}
     in_unit = getattr(block_type.Params, "in_unit", ())
     properties: Schema = {}
     for key, schema in _relocate(model.get("properties", {}), name).items():

@@ -23,10 +23,11 @@ from .life_cycle import LifeCycle, LifeState
 from .memory import BoundGraph
 from .pacing import TimeSource, WallTime
 from .real_time import NO_REAL_TIME, RealTimeOptions
-from .run_result import RunResult, SupportsAbandoned, SupportsResult, merge_metrics
-from .sinks import MemoryLog, Note, RunHash, Sink, SupportsMetrics, SupportsNotes
-from .ticker import SupportsTicker, Ticker, hang_text
-from .timing import BlockTimes, SupportsTimes, block_times
+from .run_result import RunResult, merge_metrics
+from .sink import Note, Sink
+from .sinks import MemoryLog, RunHash
+from .ticker import Ticker, WorkerBlock, hang_text
+from .timing import BlockTimes, block_times
 from .watchdog import Interrupts, Watchdog
 
 
@@ -215,8 +216,7 @@ class Executor:
         result = replace(result, warnings=tuple(self._finish_sinks(result)))
         os.write(2, f"\n{error}\n  it is at {place}\n".encode())
         for sink in self._opened:
-            if isinstance(sink, SupportsAbandoned):
-                sink.abandoned(result)
+            sink.abandoned(result)
         if not interactive:
             os._exit(int(ExitCode.RUN_FAILED))
 
@@ -238,14 +238,15 @@ class Executor:
             self._opened.append(sink)  # before the call, as a failed open may have opened a file
             sink.open(self.bound)
             self.ticker.records.append(sink.record)
-            if isinstance(sink, SupportsNotes):
-                self.ticker.notes.append(sink.note)
+            self.ticker.notes.append(sink.note)
         self.ticker.sinks = tuple(self._opened)
         if self._fuse:  # once the freeze guard has said where the block that runs is written
             self.ticker.fuse()
-        for each in (*self._sinks, *self.bound.blocks.values()):
-            if isinstance(each, SupportsTicker):
-                each.watch_ticker(self.ticker)
+        for sink in self._sinks:
+            sink.watch_ticker(self.ticker)
+        for block in self.bound.blocks.values():
+            if isinstance(block, WorkerBlock):
+                block.watch_ticker(self.ticker)
 
     def _close_sinks(self) -> list[str]:
         problems = []
@@ -259,11 +260,10 @@ class Executor:
     def _finish_sinks(self, result: RunResult) -> list[str]:
         warnings = []
         for sink in self._opened:
-            if isinstance(sink, SupportsResult):
-                try:
-                    warnings += sink.finish(result)
-                except Exception as error:  # noqa: BLE001  # the next sink must be finished too
-                    warnings.append(f"{type(sink).__name__} failed in finish: {describe(error)}")
+            try:
+                warnings += sink.finish(result)
+            except Exception as error:  # noqa: BLE001  # the next sink must be finished too
+                warnings.append(f"{type(sink).__name__} failed in finish: {describe(error)}")
         return warnings
 
     def _note(self, kind: str, text: str, level: str = "INFO") -> None:
@@ -302,8 +302,8 @@ class Executor:
         if error is None:
             self._add_warnings()
         by_block: dict[str, dict[str, Metric]] = {}
-        giving: dict[str, Block | SupportsMetrics] = {**self.bound.blocks}
-        giving |= {sink.name: sink for sink in self._opened if isinstance(sink, SupportsMetrics)}
+        giving: dict[str, Block | Sink] = {**self.bound.blocks}
+        giving |= {sink.name: sink for sink in self._opened if sink.name}
         for path, block in giving.items():
             try:
                 by_block[path] = dict(block.metrics())
@@ -329,8 +329,9 @@ class Executor:
             run_hash=self._hash.hexdigest() if self._hash is not None else "",
             metrics=metrics,
             blocks={path: self._times_of(path) for path in self.bound.graph.order},
-            overruns=pacer.overruns if pacer is not None else 0,
+            overruns=pacer.lateness.late if pacer is not None else 0,
             skipped_periods=pacer.skipped_periods if pacer is not None else 0,
+            lateness=pacer.lateness.result() if pacer is not None else None,
             error=error,
             stop_problems=tuple(problems),
             block_warnings=tuple(self._warnings),
@@ -341,7 +342,7 @@ class Executor:
 
     def _times_of(self, path: str) -> BlockTimes:
         block = self.bound.blocks[path]
-        if isinstance(block, SupportsTimes):
+        if isinstance(block, WorkerBlock):
             return block.worker_times()
         return block_times(self.ticker.programs, path, self.ticker.overruns_by_block[path])
 

@@ -20,6 +20,7 @@ from ...processes.child_process import ChildProcess
 from ..language.stages import CheckedGraph
 from .failures import INSTALLED
 from .memory import BoundGraph, nameless_memory
+from .sink import Sink
 
 BEATS = 4
 """Beats in every limit of time."""
@@ -27,7 +28,7 @@ ENDING = 10.0
 """Seconds that the process has to end after the run; it may be waiting for stacks."""
 
 
-class FreezeGuard:
+class FreezeGuard(Sink):
     """A sink that lets a process watch over this one, from the start of the blocks to their end.
 
     Use it in a ``with`` statement, within which the signal SIGUSR1 writes the stacks of all
@@ -73,9 +74,6 @@ class FreezeGuard:
             self._pipe.write(json.dumps(_describe_graph(self._graph)).encode() + b"\n")
             self._pipe.flush()
         self._beats.start()
-
-    def record(self, tick: int) -> None:
-        """Do nothing: the beats come from a thread of their own."""
 
     def close(self) -> None:
         """End the beats, once nothing can hang any more."""

@@ -29,7 +29,8 @@ from .live_parameters import LiveParameters
 
 
 class Region:
-    """One aligned buffer for a layout, zero at first, with a flat array for each section."""
+    """One aligned buffer for a layout, with a flat array for each section; at first it is zero, and
+    quaternions are the identity."""
 
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
@@ -41,6 +42,8 @@ class Region:
             for name, dtype in DTYPES.items()
             for first in (layout.offsets[name],)
         }
+        for name in layout.quaternions:
+            self.field(name)[..., 3] = 1.0
 
     def field(self, name: str, *, writable: bool = True) -> NDArray[Any]:
         """Return the view of the slot ``block.port.field``. Raises ``KeyError``."""
@@ -89,7 +92,8 @@ class Memory:
     """The bus and the state of some blocks.
 
     The bus holds all outputs in file order and, after them, one constant for every unwired input:
-    its declared default, with zero for the fields that the default does not name.
+    its declared default, with zero for the fields that the default does not name, and the identity for
+    quaternions.
 
     Raises:
         RunError: a block cannot say how large its state is, or there is not enough memory.

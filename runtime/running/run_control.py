@@ -26,7 +26,8 @@ from ..language.parameters import Parameters
 from ..language.registry import block_name
 from .failures import describe
 from .memory import BoundGraph, Snapshot
-from .sinks import Note, RunHash, SupportsResume, SupportsRewind
+from .sink import Note, Sink
+from .sinks import RunHash
 from .ticker import Ticker
 
 INTERVAL = 0.5
@@ -51,7 +52,7 @@ class _Kept:
     changes: int
 
 
-class RunControl:
+class RunControl(Sink):
     """Pauses one run and goes back in it; give it to the run as a sink, the last that keeps ticks.
 
     Args:
@@ -190,8 +191,7 @@ class RunControl:
         if ticker.pacer is not None:
             ticker.pacer.restart()
         for sink in ticker.sinks:
-            if isinstance(sink, SupportsResume):
-                sink.resume(clock.tick)
+            sink.resume(clock.tick)
         ticker.tell(Note(clock.tick, "life", "goes on"))
 
     def _keep(self, tick: int) -> None:
@@ -314,7 +314,7 @@ class RunControl:
         for sink in ticker.sinks:
             if isinstance(sink, RunHash):
                 sink.go_on_from(next(hashes))
-            elif isinstance(sink, SupportsRewind):
+            else:
                 sink.rewind(kept.tick)
 
     def _nothing_kept(self, tick: int) -> str:

@@ -27,7 +27,7 @@ from .executor import Executor
 from .life_cycle import LifeState
 from .memory import Snapshot
 from .run_result import RunResult
-from .sinks import Sink
+from .sink import Sink
 
 
 class SteppedRun:

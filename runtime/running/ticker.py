@@ -11,21 +11,23 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from itertools import groupby
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
+from ...mathematics.compiling.call_sequence import CallSequence, Owner
 from ...mathematics.compiling.chain_code import clock_address
 from ..language.block import Block
 from ..language.errors import RunError
 from ..language.schedule import phases
 from ..language.stages import ClockSpec
-from .chain import Calls, Chain, can_be_chained
 from .failures import Hang, describe
 from .finite import FiniteCheck, NotFiniteError
 from .memory import BoundGraph
 from .pacing import RobotDriven, TimeSource, make_pacer
-from .sinks import Note, Sink
-from .timing import Program
+from .sink import Note, Sink
+from .tick_calls import TickCall, can_be_chained, tick_calls
+from .timing import BlockTimes, Program
 
 
 class Pauses(Protocol):
@@ -92,13 +94,14 @@ class Ticker:
     def _make_programs(self) -> tuple[list[Program], list[Program]]:
         """Return the different programs, and for each tick of the hyperperiod the program it
         runs."""
-        graph = self.bound.graph
-        specs = [graph.block(path) for path in graph.order]
+        outputs, updates = tick_calls(self.bound.graph, self.bound.blocks)
         programs: dict[tuple[int, ...], Program] = {}
         table = []
-        for active in phases([(spec.period_ticks, spec.offset_ticks) for spec in specs]):
+        for active in phases([(call.period, call.offset) for call in outputs]):
             if active not in programs:
-                programs[active] = self._make_program([specs[i].path for i in active])
+                due = [outputs[i] for i in active]
+                paths = {call.path for call in due}
+                programs[active] = self._make_program(due, [c for c in updates if c.path in paths])
             table.append(programs[active])
         return list(programs.values()), table
 
@@ -116,50 +119,33 @@ class Ticker:
             self.programs, self._table = self._make_programs()
         return self._fused
 
-    def _make_program(self, active: Sequence[str]) -> Program:
-        calls: list[Callable[[], Any]] = []
-        owners: list[str | Chain] = []
-        updates: list[tuple[str | Chain, Callable[[], Any]]] = []
-        for path, chain in self._in_chains(active):
-            block: Any = self.bound.blocks[path]
-            if chain is not None:
-                calls.append(chain.run)
-                owners.append(chain)
-                continue
-            if type(block).is_moore():
-                calls.append(block.emit)
-            else:
-                calls.append(block.step)
-            owners.append(path)
-        moore = [path for path in active if type(self.bound.blocks[path]).is_moore()]
-        for path, chain in self._in_chains(moore, "update_calls"):
-            block = self.bound.blocks[path]
-            updates.append((path, block.update) if chain is None else (chain, chain.run))
+    def _make_program(self, outputs: Sequence[TickCall], updates: Sequence[TickCall]) -> Program:
+        made = self._in_chains(outputs)
         if self._finite is not None:
-            calls.append(self._finite.check)
-            owners.append("")
-        for owner, update in updates:
-            calls.append(update)
-            owners.append(owner)
-        sampled = self.pacer is None and any(isinstance(owner, Chain) for owner in owners)
+            made.append(("", self._finite.check))
+        made += self._in_chains(updates)
+        owners, calls = [owner for owner, _ in made], [call for _, call in made]
+        sampled = self.pacer is None and any(isinstance(owner, CallSequence) for owner in owners)
         return Program(calls, owners, self._now if self._timing else None, sampled=sampled)
 
     def _in_chains(
-        self, active: Sequence[str], which: Calls = "kernel_calls"
-    ) -> list[tuple[str, Chain | None]]:
-        """Return the blocks, those that follow each other in a chain only once, with their
-        chain."""
+        self, calls: Sequence[TickCall]
+    ) -> list[tuple[str | CallSequence, Callable[[], Any]]]:
+        """Pair the calls with their owners; kernels that follow each other are one call of a chain."""
         blocks, numbers = self.bound.blocks, {p: k for k, p in enumerate(self.bound.graph.order)}
-        found: list[tuple[str, Chain | None]] = []
-        pieces = groupby(active, lambda path: self._fused and can_be_chained(blocks[path], which))
+        found: list[tuple[str | CallSequence, Callable[[], Any]]] = []
+        pieces = groupby(
+            calls, lambda call: self._fused and can_be_chained(blocks[call.path], call.calls)
+        )
         for chained, group in pieces:
-            paths = list(group)
+            piece = list(group)
             if not chained:
-                found += [(path, None) for path in paths]
+                found += [(call.path, getattr(blocks[call.path], call.method)) for call in piece]
                 continue
-            members = [blocks[path] for path in paths]
-            chain = Chain(members, [numbers[path] for path in paths], self.bound.running, which)
-            found.append((paths[0], chain))
+            owners = [_owner(blocks[call.path], numbers[call.path], call) for call in piece]
+            chain = CallSequence(owners=owners, running=self.bound.running)
+            _prepare(chain)
+            found.append((chain, chain.run))
         return found
 
     def advance(self, ticks: int | None = None) -> int:
@@ -225,7 +211,7 @@ class Ticker:
         """Take over the calls of kernels that changed parameters have made anew, between two ticks."""
         for program in self.programs:
             for chain in program.chains:
-                chain.refresh()
+                _prepare(chain)
 
     def _record_last(self, tick: int) -> None:
         """Record the tick whose values are wrong, because it is the one to be looked at."""
@@ -262,7 +248,7 @@ class Ticker:
                 take(note)
 
     def _count_overrun(self, tick: int, late: int) -> None:
-        """Count an overrun for the block that ran when the deadline of ``tick`` passed.
+        """Count a late tick, for the block that ran when its deadline passed if one did.
 
         Raises ``RunError`` where the overrun policy is to stop.
         """
@@ -274,7 +260,7 @@ class Ticker:
         if block:
             self.overruns_by_block[block] += 1
         if self.notes:
-            ran = f"; block '{block}' was running" if block else ""
+            ran = f"; block '{block}' was running" if block else "; no block was running"
             data = {"late_ns": late, "block": block, "skipped_periods": pacer.skipped_periods}
             text = f"overrun: {late * 1e-6:.3f} ms late{ran}"
             self.tell(Note(tick, "overrun", text, "WARN", data))
@@ -288,21 +274,40 @@ class Ticker:
             )
 
 
+def _owner(block: Block, number: int, call: TickCall) -> Owner:
+    event = None if call.method == "update" else block.event
+    return Owner(
+        block, call.path, number, partial(getattr, block, call.calls), event, block.on_event
+    )
+
+
+def _prepare(chain: CallSequence) -> None:
+    """Prepare a chain. Raises ``RunError`` where a call in it is not compiled."""
+    chain.prepare()
+    for owner in chain.owners if not chain.native else ():
+        if any(getattr(call, "compiled", None) is None for call in owner.calls()):
+            text = f"block '{owner.name}' has a kernel that did not compile"
+            raise RunError(text, block=owner.name)
+
+
 def owner_of(call: Callable[..., Any] | None) -> object:
     """Return the block that makes a call, or the part of the runtime; of a chain the block that
     runs."""
     owner: object = getattr(call, "__self__", None)
     if isinstance(owner, RobotDriven):
         return owner.block
-    return owner.current if isinstance(owner, Chain) else owner
+    return owner.current if isinstance(owner, CallSequence) else owner
 
 
-@runtime_checkable
-class SupportsTicker(Protocol):
-    """The method that a sink or a block has if it shows the times of blocks, or has notes to tell."""
+class WorkerBlock(Block):
+    """A block that computes elsewhere: it takes its own times, and tells of late results."""
 
     def watch_ticker(self, ticker: Ticker) -> None:
-        """Take what measures the times, after ``open`` and before the first tick."""
+        """Take whom to tell, before the first tick."""
+
+    def worker_times(self) -> BlockTimes:
+        """Return the times of its runs."""
+        return BlockTimes()
 
 
 def hang_text(who: str, instant: str, limit: float) -> str:

@@ -11,12 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from struct import Struct
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .chain import Chain
+from ...mathematics.compiling.call_sequence import CallSequence
 
 STAMPED_TICKS = 128
 """Ticks that are stamped before they are folded; folding takes tens of microseconds."""
@@ -51,7 +51,7 @@ class Program:
     """The calls of one phase of the hyperperiod, in order, and the times they took.
 
     ``owners`` gives the path of the block that each call belongs to; it is empty for a call of the
-    runtime, and for a ``Chain`` it is the chain. A block that is called twice in a tick (``emit`` and
+    runtime, and for a ``CallSequence`` it is the chain. A block that is called twice in a tick (``emit`` and
     ``update``) counts as one run.
 
     Args:
@@ -62,7 +62,7 @@ class Program:
     def __init__(
         self,
         calls: Sequence[Callable[[], Any]],
-        owners: Sequence[str | Chain],
+        owners: Sequence[str | CallSequence],
         now: Callable[[], int] | None = None,
         *,
         sampled: bool = False,
@@ -74,7 +74,7 @@ class Program:
         self.calls = tuple(calls)
         starts, ends, names = _columns(owners)
         self.owners = tuple(names)
-        self.chains = tuple(owner for owner in owners if isinstance(owner, Chain))
+        self.chains = tuple(owner for owner in owners if isinstance(owner, CallSequence))
         self.ticks = 0
         own, columns = len(self.calls) + 1, len(names)
         self._starts, self._ends = np.array(starts, np.intp), np.array(ends, np.intp)
@@ -174,7 +174,7 @@ class Program:
         return runs, total * runs // self.ticks, int(self._maximum[column]), kept
 
 
-def _columns(owners: Sequence[str | Chain]) -> tuple[list[int], list[int], list[str]]:
+def _columns(owners: Sequence[str | CallSequence]) -> tuple[list[int], list[int], list[str]]:
     """Return, for every block's run in a tick, the places of the stamps before and after it, and
     its path.
 
@@ -185,7 +185,7 @@ def _columns(owners: Sequence[str | Chain]) -> tuple[list[int], list[int], list[
     names: list[str] = []
     free = len(owners) + 1
     for place, owner in enumerate(owners):
-        paths = owner.owners if isinstance(owner, Chain) else (owner,)
+        paths = [o.name for o in owner.owners] if isinstance(owner, CallSequence) else [owner]
         inner = range(free, free + len(paths) - 1)
         free += len(inner)
         starts += [place, *inner]
@@ -242,11 +242,3 @@ def _times(
         max_us=longest * 1e-3,
         overruns=overruns,
     )
-
-
-@runtime_checkable
-class SupportsTimes(Protocol):
-    """The method of a block that computes elsewhere, and takes its times there."""
-
-    def worker_times(self) -> BlockTimes:
-        """Return the times of its runs."""

@@ -30,6 +30,7 @@ from ..language.errors import RunError
 from .failures import Hang, location_of_frames
 from .life_cycle import STOP_CYCLES, LifeCycle, LifeState
 from .pacing import Paced
+from .sink import Sink
 from .ticker import Ticker, hang_text, owner_of
 
 _STOP_NOTICE = (
@@ -197,7 +198,7 @@ class Watchdog:
             waits = path not in blocks or blocks[path].waits_for_others
             return None if waits else (-self._life.calls, path)
         owner = owner_of(frame.f_locals["call"])
-        if getattr(owner, "waits_for_others", False):
+        if isinstance(owner, Block | Sink) and owner.waits_for_others:
             return None  # it has a limit of its own
         tick = self._ticker.bound.clock.tick
         if isinstance(owner, Block):

@@ -24,7 +24,7 @@ from ..language.stages import CheckedGraph, ClockSpec
 from ..links.part import COORDINATOR, PREPARED, STARTED, BoundPart, MergedLayout, hash_of, run_part
 from ..placement.placed import PlacedGraph, split_over_machines
 from ..running.run_result import RunResult, merge_metrics
-from ..running.sinks import Sink
+from ..running.sink import Sink
 from ..running.ticker import Ticker
 from ..transports.hub import Hub
 from ..transports.transport import MessageCallback

@@ -1,4 +1,4 @@
-"""What a session of links over TLS reads in its folder of keys: certificates and access control.
+"""Settings of a session of links over TLS from its folder of keys: certificates and access control.
 
 The extension ``deployment`` makes such folders; see ``aloft keys``.
 """
@@ -37,7 +37,7 @@ def check_endpoints(placed: PlacedGraph) -> None:
 
 
 def secured(placed: PlacedGraph, folder: Path, name: str) -> dict[str, Any]:
-    """What a session of ``name`` takes over from its folder: TLS and access control.
+    """Read the settings of a session of ``name`` from its folder: TLS and access control.
 
     Raises:
         AloftError: the folder lacks a file, or was made for another graph.

@@ -48,7 +48,7 @@ def session_settings(listen: Sequence[str], connect: Sequence[str]) -> dict[str,
 def session_config(
     listen: Sequence[str], connect: Sequence[str], secured: Mapping[str, Any] | None = None
 ) -> Any:
-    """Those settings as a Zenoh configuration; ``secured`` are more of them, for TLS and access."""
+    """Return the session's settings as a Zenoh configuration; ``secured`` adds those of TLS and access."""
     import zenoh
 
     config = zenoh.Config()

@@ -28,7 +28,7 @@ NOT_FOR_A_CHECK = (
     "aloft.planner.solving", "aloft.planner.problem", "aloft.runtime.running", "aloft.runtime.links",
     "aloft.hal.simulated.plant", "aloft.hal.simulated.drives", "aloft.hal.simulated.drive_effects",
     "aloft.hal.simulated.imu_effects", "aloft.hal.simulated.switch_effects", "aloft.hal.simulated.gears",
-    "aloft.hal.simulated.joint_effects", "aloft.hal.simulated.gantry",
+    "aloft.hal.simulated.stribeck", "aloft.hal.simulated.gantry",
     "aloft.hal.simulated.sensors", "aloft.hal.simulated.mujoco_model",
 )  # fmt: skip
 """Modules, with all that lies in them, which only a run needs, or a picture, or a report."""

@@ -11,7 +11,7 @@ from aloft.cli.jump import load_jump, settings_for, task_changes, task_of
 from aloft.cli.shared.robot_trials import TrialOptions, graph_of
 from aloft.planner.library import library
 from aloft.runtime.language.errors import AloftError
-from aloft.studies.rehearsal import trial_settings
+from aloft.studies.trials import trial_settings
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]
@@ -90,8 +90,8 @@ def test_the_step_the_score_and_the_trial_are_in_the_graph() -> None:
     asked = {"distance_x": 0.2, "landing_height": 0.05}
     graph = load_jump(BRUCE, settings_for(asked, TrialOptions(trial="robust")), 7)
     robot, score = graph.checked.block("robot").params, graph.checked.block("score").params
-    assert (robot.model_dump()["seed"], robot.model_dump()["mass_spread"]) == (7, 0.05)
-    assert robot.model_dump()["scene"]["boxes"][0]["top"] == 0.05
+    assert (robot.model_dump()["seed"], robot.model_dump()["body"]["mass_spread"]) == (7, 0.05)
+    assert robot.model_dump()["ground"]["scene"]["boxes"][0]["top"] == 0.05
     assert score.model_dump()["distance"] == [0.2, 0.0]
     assert score.model_dump()["landing_height"] == 0.05
     assert task_of(graph).name == "12 cm high, 20 cm ahead, 5 cm up"
@@ -103,7 +103,7 @@ def test_a_trial_takes_back_what_only_another_sets() -> None:
         .checked.block("robot")
         .params
     )
-    assert nominal.model_dump()["gyro_noise"] == 0.0
+    assert nominal.model_dump()["sensors"]["gyro_noise"] == 0.0
     assert nominal.model_dump()["latency"] == 0.0
     assert nominal.model_dump()["timestep"] == 0.0005
     go2, _ = graph_of("go2")
@@ -112,8 +112,8 @@ def test_a_trial_takes_back_what_only_another_sets() -> None:
         .checked.block("robot")
         .params
     )
-    assert standard.model_dump()["mass_spread"] == 0.0
-    assert standard.model_dump()["gyro_noise"] == 0.02
+    assert standard.model_dump()["body"]["mass_spread"] == 0.0
+    assert standard.model_dump()["sensors"]["gyro_noise"] == 0.02
     with pytest.raises(
         AloftError,
         match="--trial windy: there is nominal, pushed, real, robust, standard, uneven, warm",
@@ -200,10 +200,13 @@ def test_one_line_plans_runs_and_records(folder: Path, call_json: CallJson) -> N
 
 
 def test_a_trial_takes_back_what_only_others_set() -> None:
-    """Groups of parameters as a whole, and before what the trial sets within them."""
+    """Groups that are left out by default as a whole, and before what the trial sets within them."""
     robust, real = trial_settings("robust"), trial_settings("real")
-    assert robust["robot.imu"] == {**robust["robot.imu"], "bandwidth": None, "gyro_delay": 0.0}
-    assert robust["robot.battery"] is None
+    assert robust["robot.sensors.imu.bandwidth"] is None
+    assert robust["robot.sensors.imu.gyro_delay"] == 0.0
+    assert robust["robot.actuators.battery"] is None
     names = list(real)
-    assert real["robot.imu.bandwidth"] == "100 Hz"
-    assert names.index("robot.imu") < names.index("robot.imu.bandwidth")
+    assert real["robot.sensors.imu.bandwidth"] == "100 Hz"
+    inside = names.index("robot.actuators.battery.recovery_time")
+    assert names.index("robot.actuators.battery") < inside
+    assert "robot.ground" not in names, "the graph's own scene stays"

@@ -176,5 +176,8 @@ def test_pages_of_what_does_not_run(sockets: Path, call: Call) -> None:
         "--live is for a graph that is running" in call("graph", "a.rrd", "--live", code=2).stderr
     )
     assert "--run NAME is for --live" in call("graph", "tune.yaml", "--run", "a", code=2).stderr
-    assert "give a graph file, or --live for one that runs" in call("graph", code=2).stderr
+    assert (
+        "give a graph file, or --live for one that runs"
+        in call("graph", "--svg", "a.svg", code=2).stderr
+    )
     assert "choose one of" in call("graph", "--live", "--json", code=2).stdout

@@ -50,22 +50,27 @@ def test_show_prints_the_tree_the_motors_the_feet_and_the_sensors() -> None:
 def test_show_lists_the_effects_that_can_be_simulated() -> None:
     found = run_for_json("robot", "show", "bruce", "--effects")["effects"]
     rows = {".".join(filter(None, (row["group"], row["parameter"]))): row for row in found}
-    bandwidth = rows["imu.bandwidth"]
+    bandwidth = rows["sensors.imu.bandwidth"]
     assert bandwidth["unit"] == "Hz" and bandwidth["default"] is None
     assert bandwidth["trial"] == "100 Hz"
     assert bandwidth["source"] == "data sheets of MEMS units: 5 to 400 Hz to choose from"
-    assert rows["switch_threshold"]["trial"] == ["0.5 N", "3 N"], "from a trial that it includes"
-    assert rows["gyro_noise"]["trial"] == "0.02 rad/s", "of an included trial"
-    assert rows["gears.stiffness"]["required"] and rows["gears.stiffness"]["group_is_off"]
-    assert rows["gears.stiffness"]["trial"] is None
+    assert rows["sensors.switch_threshold"]["trial"] == ["0.5 N", "3 N"], (
+        "from a trial that it includes"
+    )
+    assert rows["sensors.gyro_noise"]["trial"] == "0.02 rad/s", "of an included trial"
+    assert (
+        rows["actuators.gears.stiffness"]["required"]
+        and rows["actuators.gears.stiffness"]["group_is_off"]
+    )
+    assert rows["actuators.gears.stiffness"]["trial"] is None
     taken = {
         f"robot.{name}": row["trial"] for name, row in rows.items() if row["trial"] is not None
     }
     graph = aloft.load(Path(aloft.__file__).parent / "graphs/jump.yaml", overrides=taken)
     assert graph is not None, "every path and value is one that a graph takes"
     text = run_here("robot", "show", "bruce", "--effects").stdout
-    line = next(line for line in text.splitlines() if " motors.saturation " in line)
-    assert line.split()[:3] == ["motors.saturation", "0.0", "0.1"]
+    line = next(line for line in text.splitlines() if " actuators.motors.saturation " in line)
+    assert line.split()[:3] == ["actuators.motors.saturation", "0.0", "0.1"]
 
 
 def test_show_for_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -233,8 +238,8 @@ def test_export_writes_a_urdf(tmp_path: Path) -> None:
 
 GRAPHS = Path(aloft.__file__).parent / "graphs"
 INJECTED: dict[str, Any] = {
-    "robot.seed": 5, "robot.mass_scale": 1.08, "robot.joint_friction": 1.6,
-    "robot.latency": "4 ms", "robot.base_com_offset": ["4 mm", "0 mm", "0 mm"],
+    "robot.seed": 5, "robot.body.mass_scale": 1.08, "robot.actuators.joint_friction": 1.6,
+    "robot.latency": "4 ms", "robot.body.base_com_offset": ["4 mm", "0 mm", "0 mm"],
 }  # fmt: skip
 
 

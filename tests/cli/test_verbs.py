@@ -83,10 +83,10 @@ def test_shipped_graphs_have_addresses(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Call, call_json: CallJson
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    listed = {row["graph"]: row for row in call_json("graphs")["graphs"]}
+    listed = {row["graph"]: row for row in call_json("graph")["graphs"]}
     assert {"aloft:jump", "aloft:push", "aloft:robots/go2_jump"} <= set(listed)
     assert all(row["summary"] for row in listed.values())
-    assert "aloft:jump" in call("graphs").stdout
+    assert "aloft:jump" in call("graph").stdout
     assert "no problems" in call("check", "aloft:jump").stdout
     assert aloft.load("aloft:jump").checked.name == "jump"
     for wrong in ("jump.yaml", "graphs/jump.yaml", "aloft:jmp"):
@@ -226,7 +226,7 @@ def test_a_bug_does_not_look_like_a_fall(
     def broken(*_: object) -> None:
         raise ZeroDivisionError("by zero")
 
-    monkeypatch.setattr(aloft.runtime.loading, "load", broken)
+    monkeypatch.setattr(aloft.runtime.loading, "checked_file", broken)
     result = call_json("check", "count.yaml", code=3)
     assert result == {"success": False, "reason": "bug: ZeroDivisionError: by zero"}
     assert "Traceback" in call("check", "count.yaml", code=3).stderr

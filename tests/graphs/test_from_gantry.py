@@ -38,7 +38,7 @@ def test_the_plan_begins_when_all_switches_have_been_loaded() -> None:
 
 @pytest.mark.long
 def test_a_robot_that_nobody_puts_down_waits_without_a_fault() -> None:
-    result = run(robot__gantry={"height": 0.04, "lower_after": None})
+    result = run(robot__start__gantry={"height": 0.04, "lower_after": None})
     assert not result.success and result.reason == "the plan has not begun"
     assert result.metrics["safety_fault"] == "none"
 
@@ -46,5 +46,5 @@ def test_a_robot_that_nobody_puts_down_waits_without_a_fault() -> None:
 @pytest.mark.long
 def test_it_jumps_from_a_gantry_through_the_driver() -> None:
     gantry = {"height": 0.06, "speed": 0.1, "lower_after": 1.0}
-    result = run(robot__use="hal.TwinRobot", robot__seed=1, robot__gantry=gantry)
+    result = run(robot__use="hal.TwinRobot", robot__seed=1, robot__start__gantry=gantry)
     assert result.success, result.reason

@@ -13,7 +13,7 @@ import yaml
 
 import aloft
 from aloft.hal.bear.configuration import Hardware
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.twin.server import TwinServer
 from aloft.hal.twin.twin import standing_twin
 from aloft.logs.recording.recorder import Recorder
@@ -21,6 +21,8 @@ from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
 from aloft.robots.description import find_robot
 from aloft.runtime.running.executor import Executor
+
+from ..simulator_settings import grouped
 
 GRAPHS = Path(aloft.__file__).parent / "graphs"
 ROBOT = find_robot("bruce")
@@ -90,7 +92,7 @@ def test_a_bad_switch_ends_in_damping(kind: str, text: str, latest: float) -> No
 def run_behind_ports(folder: Path, *options: str) -> tuple[str, float]:
     """Run jump_robot.yaml in another process; gives its hash, and how high the twin's torso was."""
     hardware = Hardware.for_twin(ROBOT)
-    twin = standing_twin(ROBOT, SimulatorParameters.model_validate(STANDARD), hardware)
+    twin = standing_twin(ROBOT, SimulatorParameters.model_validate(grouped(STANDARD)), hardware)
     highest, send = 0.0, twin._send_packet
 
     def watched() -> None:

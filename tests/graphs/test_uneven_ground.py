@@ -24,7 +24,7 @@ def land(folder: Path, box: dict[str, object], **sets: object) -> aloft.RunResul
         "include": [str(GRAPHS / file) for file in files],
         "set": {
             "plan.task": {"rise": "12 cm", "distance_x": "20 cm"},
-            "robot.scene": {"uneven": box["top"], "boxes": [box]},
+            "robot.ground.scene": {"uneven": box["top"], "boxes": [box]},
             "robot.seed": 98001,
             **sets,
         },

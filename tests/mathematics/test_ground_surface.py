@@ -8,7 +8,7 @@ import pytest
 
 from aloft.hal.simulated.mujoco_model import build_mujoco_model
 from aloft.robots.description import find_robot
-from aloft.runtime.language.terrain import Ground, HeightField, Terrain
+from aloft.robots.terrain import Ground, HeightField, Terrain
 
 HEIGHTS = tuple(map(tuple, (0.1 * np.random.default_rng(1).random((6, 9))).tolist()))
 TERRAIN = Terrain(

@@ -16,7 +16,7 @@ from aloft.mathematics.invariant_filter import (
     input_jacobian,
     invert,
     measurement_jacobian,
-    place_jacobian,
+    position_jacobian,
     propagate_covariance,
     remove_contact,
     squared_distance,
@@ -227,7 +227,7 @@ def test_where_the_legs_see_a_point(point):
         return out
 
     sensitivity = np.empty((3, CONTACTS_SIZE))
-    place_jacobian(world.jacobians[point], OFFSETS, sensitivity)
+    position_jacobian(world.jacobians[point], OFFSETS, sensitivity)
     measurement_jacobian(point, sensitivity)
     assert residual(np.zeros(CONTACTS_SIZE)) == pytest.approx(np.zeros(3), abs=1e-15)
     np.testing.assert_allclose(world.differentiate(residual), -sensitivity, atol=1e-8)
@@ -269,7 +269,7 @@ def test_a_point_that_comes_is_as_uncertain_as_the_legs_and_the_base():
     assert not covariance[rows].any() and not covariance[:, rows].any()
     before, noise = covariance.copy(), 1e-6 * np.diag([1.0, 2.0, 3.0])
     sensitivity = np.empty((3, CONTACTS_SIZE))
-    place_jacobian(world.jacobians[point], OFFSETS, sensitivity)
+    position_jacobian(world.jacobians[point], OFFSETS, sensitivity)
     add_contact(
         point,
         sensitivity,

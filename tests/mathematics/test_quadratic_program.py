@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aloft.mathematics.quadratic_program import QuadraticProgramSolver
+from aloft.mathematics import quadratic_program
+from aloft.mathematics.quadratic_program import (
+    PACKAGES,
+    Clarabel,
+    QuadraticProgramSolver,
+    is_optimal,
+)
 
 
 def problem(seed, size=6, rows=8):
@@ -38,7 +45,18 @@ def test_two_exact_solvers_agree_and_the_optimality_conditions_hold(seed):
     assert multipliers[2:].min(initial=0.0) > -1e-5
 
 
-@pytest.mark.parametrize("solver", ["daqp", "quadprog"])
+@pytest.mark.parametrize("solver", PACKAGES)
+def test_every_solver_finds_the_optimum_also_beside_a_bound_that_never_binds(solver):
+    for seed in range(3):
+        p, q, g, h, a, b = problem(seed)
+        h[3] = 1e14
+        exact = QuadraticProgramSolver("daqp").solve(p, q, g[h < 1e9], h[h < 1e9], a, b)
+        assert QuadraticProgramSolver(solver).solve(p, q, g, h, a, b) == pytest.approx(
+            exact, abs=1e-5
+        )
+
+
+@pytest.mark.parametrize("solver", PACKAGES)
 def test_an_infeasible_problem_has_no_answer(solver):
     g, h = np.array([[1.0], [-1.0]]), np.array([-1.0, -1.0])
     empty = np.zeros((0, 1))
@@ -46,11 +64,74 @@ def test_an_infeasible_problem_has_no_answer(solver):
     assert found is None
 
 
+def answer_of(seed, solver="daqp", **change):
+    """The optimality conditions of a solver's answer, of which ``change`` replaces a part."""
+    qpsolvers = pytest.importorskip("qpsolvers")
+    program = problem(seed)
+    found = qpsolvers.solve_problem(qpsolvers.Problem(*program), solver)
+    answer = SimpleNamespace(x=found.x, y=found.y, z=found.z)
+    for name, value in change.items():
+        setattr(answer, name, value(getattr(answer, name)))
+    return is_optimal(*program, answer)
+
+
 @pytest.mark.parametrize("solver", ["daqp", "quadprog"])
+@given(st.integers(0, 10_000))
+def test_the_optimality_conditions_hold_for_exact_answers(solver, seed):
+    assert answer_of(seed, solver)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"x": lambda x: x + 1e-3},
+        {"z": lambda z: z + 1e-3},
+        {"z": lambda z: -z - 1.0},
+        {"y": lambda y: y + 1e-3},
+        {"y": lambda _: None},
+        {"z": lambda _: None},
+    ],
+)
+def test_a_point_beside_the_optimum_is_no_answer(change):
+    assert not answer_of(4, **change)
+
+
+def test_a_solver_that_stops_early_has_no_answer():
+    early = {"eps_abs": 1e-2, "check_duality_gap": False}
+    x = QuadraticProgramSolver("proxqp", early).solve(*problem(1))
+    assert x is None
+
+
+@pytest.mark.parametrize("status", ["AlmostSolved", "InsufficientProgress", "MaxIterations"])
+def test_a_status_of_clarabel_that_is_not_optimal_has_no_answer(status, monkeypatch):
+    found = SimpleNamespace(x=np.zeros(6), status=status)
+    monkeypatch.setattr(Clarabel, "answer", lambda *_: found)
+    assert QuadraticProgramSolver("clarabel").solve(*problem(0)) is None
+    found.status = "Solved"
+    assert QuadraticProgramSolver("clarabel").solve(*problem(0)) is not None
+
+
+@pytest.mark.parametrize("solver", PACKAGES)
 def test_not_a_number_has_no_answer(solver):
     p, q, g, h, a, b = problem(0)
     q[2] = np.nan
     assert QuadraticProgramSolver(solver).solve(p, q, g, h, a, b) is None
+
+
+@pytest.mark.parametrize(("solver", "package"), PACKAGES.items())
+def test_a_solver_that_is_not_installed_comes_with_the_line_for_pip(solver, package, monkeypatch):
+    monkeypatch.setattr("qpsolvers.available_solvers", ["scs"])
+    monkeypatch.setattr(quadratic_program, "find_spec", lambda _: None)
+    text = f"^the quadratic-program solver '{solver}' is not installed: pip install {package}$"
+    with pytest.raises(LookupError, match=text):
+        QuadraticProgramSolver(solver)
+
+
+def test_a_misspelt_solver_is_told_the_nearest():
+    with pytest.raises(
+        LookupError, match=r"solver 'quadprogg' is installed; did you mean quadprog\?"
+    ):
+        QuadraticProgramSolver("quadprogg")
 
 
 def test_an_unknown_solver_is_named_with_those_there_are():
@@ -58,8 +139,9 @@ def test_an_unknown_solver_is_named_with_those_there_are():
         QuadraticProgramSolver("magic")
 
 
-def test_the_answer_depends_on_the_problem_alone():
-    solver = QuadraticProgramSolver("daqp")
+@pytest.mark.parametrize("name", ["daqp", "clarabel", "quadprog"])
+def test_the_answer_depends_on_the_problem_alone(name):
+    solver = QuadraticProgramSolver(name)
     first = solver.solve(*problem(1))
     solver.solve(*problem(2))
     assert solver.solve(*problem(1)).tobytes() == first.tobytes()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aloft.mathematics.stance_feet import find_stance_feet, mean_place
+from aloft.mathematics.stance_feet import find_stance_feet, mean_position
 
 OWNERS = np.array([0, 0, 1, 2])
 
@@ -26,5 +26,5 @@ def test_a_foot_stands_on_any_of_its_points(contact, expected):
 
 def test_the_mean_is_that_of_the_chosen_ones():
     points, out = np.random.default_rng(1).normal(size=(3, 3)), np.ones(3)
-    mean_place(points, np.array([True, False, True]), 2, out)
+    mean_position(points, np.array([True, False, True]), 2, out)
     assert out == pytest.approx(0.5 * (points[0] + points[2]))

@@ -53,7 +53,7 @@ def test_what_was_rehearsed_is_of_the_shipped_plan_and_controller(path: Path) ->
 
 def test_the_rows_that_hop_on_mixes_are_shipped(tmp_path: Path) -> None:
     """So that the graph runs without a solver, and to the same bytes everywhere."""
-    params: Any = load(SHIPPED.parent / "hop_on.yaml").checked.block("plan").params
+    params: Any = load("aloft:hopping/hop_on").checked.block("plan").params
     robot = find_robot("bruce")
     for way in row_lengths(params):
         assert PlanLibrary(robot, tmp_path).find(row_task(params, "bruce", way)) is not None, REMEDY

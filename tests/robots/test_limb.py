@@ -7,7 +7,14 @@ import pytest
 
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import link_poses
-from aloft.robots.limb import FootKind, chain_to, foot_shape, limb_jacobian, place_limb, read_limb
+from aloft.robots.limb import (
+    FootKind,
+    chain_to,
+    foot_shape,
+    limb_jacobian,
+    read_limb,
+    set_limb_pose,
+)
 
 from .limbed_robots import LIGHT_QUADRUPED, SEVEN_JOINTS, humanoid, quadruped, slider
 
@@ -19,7 +26,7 @@ ROBOTS = [
 
 def place(limb, angles):
     pose, anchors = np.zeros((4, 3)), np.zeros((len(limb.joints), 6))
-    place_limb(limb.links, limb.tip, np.asarray(angles, float), anchors, pose)
+    set_limb_pose(limb.links, limb.tip, np.asarray(angles, float), anchors, pose)
     return pose, anchors
 
 

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from aloft.robots import five_joint_leg
 from aloft.robots.description import find_robot
-from aloft.robots.limb import FootKind, aim, foot_error, place_limb, read_limb, turning
+from aloft.robots.limb import FootKind, aim, foot_error, read_limb, set_limb_pose, turning
 from aloft.robots.limb_inverse import (
     REACHED,
     approach,
@@ -39,7 +39,7 @@ kinds = pytest.mark.parametrize("name", LIMBS)
 
 def pose_of(limb, angles):
     pose = np.zeros((4, 3))
-    place_limb(limb.links, limb.tip, np.asarray(angles, float), np.zeros((len(angles), 6)), pose)
+    set_limb_pose(limb.links, limb.tip, np.asarray(angles, float), np.zeros((len(angles), 6)), pose)
     return pose
 
 

@@ -24,7 +24,7 @@ from aloft.robots.contact_kinematics import ContactKinematics
 from aloft.robots.description import find_robot
 from aloft.robots.five_joint_leg import find_leg, forward
 from aloft.robots.kinematics import ball_feet, link_poses, link_poses_in_base, standing_com
-from aloft.robots.limb import place_limb, read_limb
+from aloft.robots.limb import read_limb, set_limb_pose
 from aloft.robots.pinocchio_model import build_pinocchio_model
 
 from ..planner.models.test_symbolic_model import evaluate, to_pinocchio
@@ -154,7 +154,7 @@ def test_every_model_of_a_robot_puts_it_in_the_same_place(name: str) -> None:
         limb, leg = read_limb(robot, foot), find_leg(robot, foot)
         pose, sole = np.empty((4, 3)), memory.oMf[frame]
         angles = joints[list(limb.joints)]
-        place_limb(limb.links, limb.tip, angles, np.empty((len(angles), 6)), pose)
+        set_limb_pose(limb.links, limb.tip, angles, np.empty((len(angles), 6)), pose)
         close(base + turn @ pose[0], sole.translation)
         close(turn @ pose[1:], sole.rotation)
         if leg is not None:

@@ -1,4 +1,4 @@
-"""Which parameters decide a metric, for ``aloft sensitivity``: the runs, the table and the chart."""
+"""Sensitivity of a metric, for ``aloft sensitivity``: the runs, the table and the chart."""
 
 from __future__ import annotations
 

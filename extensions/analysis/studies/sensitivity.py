@@ -24,7 +24,8 @@ from ....files.problems import LoadError, Position, listing, nearest
 from ....files.validation import unit_of
 from ....mathematics.arrays import Array
 from ....plotting import COLOURS, FAINT, image, new_figure, style, svg_text
-from ....runtime.language.errors import AloftError
+from ....runtime.language.errors import AloftError, pip_line
+from ....runtime.language.parameters import given_values
 from ....studies.execution import Run
 from ....studies.expansion import Cell, load_cell
 from ....studies.tuning import Make, draw_runs
@@ -78,7 +79,7 @@ def import_salib() -> Any:
         import SALib.sample.sobol
     except ImportError as error:
         raise AloftError(
-            "SALib is not installed; install it with: pip install 'aloft-robotics[analysis]'"
+            f"SALib is not installed; install it with: {pip_line('analysis')}"
         ) from error
     return SALib
 
@@ -136,8 +137,8 @@ def numeric_parameters(
     for spec in graph.blocks:
         if "~" in spec.path:
             continue
-        for name, info in type(spec.params).model_fields.items():
-            value, key = getattr(spec.params, name), f"{spec.path}.{name}"
+        for name, value, info in given_values(spec.params):
+            key = f"{spec.path}.{name}"
             asked = any(fnmatchcase(key, pattern) for pattern in chosen)
             if not asked or not isinstance(value, float):
                 continue

@@ -26,7 +26,7 @@ def explained(graph: str, settings: Settings) -> Explanation:
 
 def box(x: float, y: float, top: float) -> Settings:
     """A box as high as ``top`` from ``x`` and from ``y`` on."""
-    return {"robot.scene": {"boxes": [{"x": [x, 0.6], "y": [y, 0.5], "top": top}]}}
+    return {"robot.ground.scene": {"boxes": [{"x": [x, 0.6], "y": [y, 0.5], "top": top}]}}
 
 
 def link(kind: str, name: str, begin: float, end: float) -> Deviation:
@@ -86,24 +86,24 @@ def test_nothing_is_named_where_nothing_is_wrong(graph: str, seed: int) -> None:
 
 FAILURES: list[tuple[str, str, Settings, str, str]] = [
     # what is told to the robot's sensors
-    ("accelerometer", JUMP, {"robot.accelerometer_bias": 4.0}, "sensor", "accelerometer along"),
-    ("switches", JUMP, {"robot.switch_threshold": [25.0, 30.0]}, "sensor", "switch of"),
+    ("accelerometer", JUMP, {"robot.sensors.accelerometer_bias": 4.0}, "sensor", "accelerometer along"),
+    ("switches", JUMP, {"robot.sensors.switch_threshold": [25.0, 30.0]}, "sensor", "switch of"),
     # what the controller does not know
     ("latency", JUMP, {"robot.latency": 0.02, "delay.nominal": 0.002, "delay.follow": "nominal"},
      "estimate", "measured delay off the one"),
-    ("com", JUMP, {"robot.base_com_offset": [0.06, 0.0, 0.0]}, "estimate", "estimated centre of mass"),
-    ("heavy", JUMP, {"robot.mass_scale": 1.6}, "estimate", "felt mass off the truth"),
-    ("weak", JUMP, {"robot.motors": {"torque_constant": 0.7}}, "estimate", "felt mass off the truth"),
-    ("floor", AHEAD, {"robot.friction": 0.05}, "world", "_toe slides"),
-    ("edge", AHEAD, {"robot.scene": {"boxes": [
+    ("com", JUMP, {"robot.body.base_com_offset": [0.06, 0.0, 0.0]}, "estimate", "estimated centre of mass"),
+    ("heavy", JUMP, {"robot.body.mass_scale": 1.6}, "estimate", "felt mass off the truth"),
+    ("weak", JUMP, {"robot.actuators.motors": {"torque_constant": 0.7}}, "estimate", "felt mass off the truth"),
+    ("floor", AHEAD, {"robot.ground.friction": 0.05}, "world", "_toe slides"),
+    ("edge", AHEAD, {"robot.ground.scene": {"boxes": [
         {"x": [0.1, 0.2], "y": [-0.5, 0.5], "top": 0.01}]}},
      "world", "upward force beside the contact points"),
     # jumps and pushes beyond what the robot can do, as they are
     ("pushed left", PUSH, {"push.force": 160.0, "push.angle": np.pi / 2}, "world", "push"),
     ("pushed back", PUSH, {"push.force": 130.0, "push.angle": np.pi}, "world", "push"),
     ("weak and far", "graphs/forward_38cm.yaml",
-     {"robot.motors": {"saturation": 0.3}, "robot.friction": 0.35}, "world", "_toe slides"),
-    ("tiles", AHEAD, {"robot.seed": 6, "estimator.level_ground": True, "step.seek_speed": 0.0, "robot.uneven": {
+     {"robot.actuators.motors": {"saturation": 0.3}, "robot.ground.friction": 0.35}, "world", "_toe slides"),
+    ("tiles", AHEAD, {"robot.seed": 6, "estimator.level_ground": True, "step.seek_speed": 0.0, "robot.ground.uneven": {
         "size": [0.1, 0.2], "height": 0.02, "slope": 0.087, "friction": [0.4, 1.0]}},
      "world", "ground under"),
 ]  # fmt: skip
@@ -155,7 +155,7 @@ def test_a_foot_that_stops_in_the_air() -> None:
 
 @pytest.mark.long
 def test_contacts_are_named_one_by_one_with_what_they_did() -> None:
-    found = explained(JUMP, {"robot.switch_threshold": [25.0, 30.0]})
+    found = explained(JUMP, {"robot.sensors.switch_threshold": [25.0, 30.0]})
     missed = [c for c in found.contacts if not c.false and c.begin > 0.5]
     assert {c.point for c in missed} == {"left_toe", "left_heel", "right_toe", "right_heel"}
     assert all(c.load > 10.0 for c in missed)

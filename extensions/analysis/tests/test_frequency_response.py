@@ -131,7 +131,7 @@ MEASURED = {"inputs": KNEE, "at": 1.5, "seeds": range(1000, 1005), "low": 1.0, "
 @pytest.mark.long
 def test_the_stance_of_the_jump_answers_as_its_linear_model_says() -> None:
     """With the sensors' noise; without friction of the joints, which no linear model has."""
-    graph = aloft.load(GRAPHS / "push.yaml", {**STANCE, "robot.joint_friction": 0.0})
+    graph = aloft.load(GRAPHS / "push.yaml", {**STANCE, "robot.actuators.joint_friction": 0.0})
     wire = "joint_pd.command.torque[*]"
     model = linearise(graph, inputs=wire, outputs=wire, opened=True, at=1.5)
     (found,) = frequency_responses(graph, size="0.1 N m", **MEASURED)

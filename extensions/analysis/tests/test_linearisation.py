@@ -16,7 +16,7 @@ from aloft.logs.file.header import recorded_signals
 GRAPHS = Path(__file__).parents[3] / "graphs"
 PROJECTS = Path(__file__).parents[3] / "docs" / "projects"
 T = 0.01
-QUIET = {"push.force": 0.0, "robot.jitter": 0.0, "robot.joint_velocity_noise": 0.0, "robot.switch_bounce": 0.0,
+QUIET = {"push.force": 0.0, "robot.jitter": 0.0, "robot.sensors.joint_velocity_noise": 0.0, "robot.sensors.switch_bounce": 0.0,
          **{f"robot.{sensor}_{error}": 0.0
             for sensor in ("gyro", "accelerometer") for error in ("noise", "bias")}}  # fmt: skip
 
@@ -214,7 +214,7 @@ def test_the_cart_pole_has_the_poles_of_its_equations() -> None:
     """M q'' + D q' + K q = S f of a cart with a uniform pole, upright, by hand."""
     loaded = aloft.load(
         PROJECTS / "cart_pole" / "balance.yaml",
-        {"robot.joint_velocity_noise": "0 rad/s", "robot.latency": "0 s"},
+        {"robot.sensors.joint_velocity_noise": "0 rad/s", "robot.latency": "0 s"},
     )
     model = linearise(
         loaded, inputs="balance.command.torque[slide]", outputs="balance.command.torque[slide]",

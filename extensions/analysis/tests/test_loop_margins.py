@@ -90,9 +90,9 @@ def test_margins_need_a_loop() -> None:
 
 STANDING = {
     "plan.stand_time": 10.0, "push.force": 0.0, "delay.nominal": "2 ms", "delay.follow": "nominal",
-    "robot.jitter": 0.0, "robot.joint_velocity_noise": 0.0, "robot.switch_bounce": 0.0,
-    "robot.gyro_noise": 0.0, "robot.gyro_bias": 0.0, "robot.accelerometer_noise": 0.0,
-    "robot.accelerometer_bias": 0.0,
+    "robot.jitter": 0.0, "robot.sensors.joint_velocity_noise": 0.0, "robot.sensors.switch_bounce": 0.0,
+    "robot.sensors.gyro_noise": 0.0, "robot.sensors.gyro_bias": 0.0, "robot.sensors.accelerometer_noise": 0.0,
+    "robot.sensors.accelerometer_bias": 0.0,
 }  # fmt: skip
 
 

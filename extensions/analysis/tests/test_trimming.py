@@ -92,7 +92,11 @@ def test_a_run_is_left_in_the_operating_point_and_can_be_linearised_there() -> N
 
 def test_an_arm_holds_its_weight_with_the_torque_of_the_formula() -> None:
     """Two links in a vertical plane: tau = sum of m g times the horizontal lever of each centre of mass."""
-    quiet = {"robot.encoder_offset": 0.0, "robot.joint_velocity_noise": 0.0, "robot.latency": 0.0}
+    quiet = {
+        "robot.sensors.encoder_offset": 0.0,
+        "robot.sensors.joint_velocity_noise": 0.0,
+        "robot.latency": 0.0,
+    }
     with aloft.load(PROJECTS / "arm" / "reach.yaml", quiet).open() as run:
         found = trim(
             run, free="reach.command.torque[*]", settle=2, tolerance=1e-5,

@@ -13,7 +13,7 @@ import numpy as np
 
 from ....blocks.signals import ImuReading
 from ....hal.simulated.effects import GantryParameters
-from ....hal.simulated.simulated_robot import SimulatorParameters
+from ....hal.simulated.parameters import SensorParameters, SimulatorParameters, StartParameters
 from ....hal.twin.devices import EmulatedActuator, EmulatedBoard, EmulatedBus
 from ....hal.twin.twin import Twin
 from ....hal.twin.wiring import Wiring
@@ -157,10 +157,14 @@ class RobotByHand:
         errors = self._errors
         params = SimulatorParameters(
             seed=self._seed, timestep=PACKET_TIME if lower_after is None else 0.0005,
-            gyro_noise=errors.gyro, gyro_bias=errors.gyro_bias,
-            accelerometer_noise=errors.force, accelerometer_bias=errors.force_bias,
-            joint_velocity_noise=0.05 if errors.gyro else 0.0,
-            gantry=GantryParameters(height=height, lower_after=lower_after),
+            sensors=SensorParameters(
+                gyro_noise=errors.gyro, gyro_bias=errors.gyro_bias,
+                accelerometer_noise=errors.force, accelerometer_bias=errors.force_bias,
+                joint_velocity_noise=0.05 if errors.gyro else 0.0,
+            ),
+            start=StartParameters(
+                gantry=GantryParameters(height=height, lower_after=lower_after)
+            ),
         )  # fmt: skip
         return self.wiring.twin(self.robot, params, held=held)
 

@@ -44,7 +44,7 @@ WAVE_TIME = 1.5
 APPROACH = 0.5
 """Time to reach the middle of the waves, and to grow them [s]."""
 STIFFNESS, DAMPING = 12.0, 0.3
-"""Of the drives that move it, at their outputs [N m/rad, N m s/rad]."""
+"""Stiffness and damping of the drives that move it, at their outputs [N m/rad, N m s/rad]."""
 CONSTANT_ERROR = 0.2
 """The share by which a torque constant may differ: the links' inertias are not known better."""
 WRITTEN_ERROR = 0.5

@@ -99,7 +99,7 @@ def _chosen(source: Path | None, robot: str) -> tuple[Path, list[str]]:
         return source, []
     from ....runtime.loading.reading.files import PREFIX, shipped_graphs
 
-    name = "calibrate" if robot == "bruce" else "robots/calibrate"
+    name = "commissioning/calibrate" if robot == "bruce" else "commissioning/robots/calibrate"
     return shipped_graphs()[f"{PREFIX}{name}"], [robot_setting(robot)]
 
 

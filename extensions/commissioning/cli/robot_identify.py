@@ -154,7 +154,7 @@ def graph_values(
     delay: IdentifiedDelay,
     file: Path,
 ) -> str:
-    """The values as a graph's ``set``, for the blocks of the recorded graph that take them."""
+    """Return the values as a graph's ``set``, for the blocks of the recorded graph that take them."""
 
     def path(kind: str, usual: str) -> str:
         found = (b.path for b in run.header.blocks if b.type.rpartition(":")[2] == kind)

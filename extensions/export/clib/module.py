@@ -17,16 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....mathematics.compiling.arguments import (
-    ArgumentType,
-    ArrayType,
-    RecordType,
-    type_of,
-)
+from ....mathematics.compiling.arguments import ArgumentType, ArrayType, RecordType, type_of
 from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.compiling.llvm_code import leaves, number
 from ....mathematics.compiling.machine_code import read_only_arguments
 from ....mathematics.compiling.translate import ATTRIBUTES, Translator
+from ....runtime.running.tick_calls import TickCall, tick_calls
 from .image import Image
 from .part import SubGraph, terminal_groups
 
@@ -93,8 +89,8 @@ class Module:
         self.name, self.part, self.mark, self._texts = name, part, mark, texts
         self._functions = functions or {}
         memory = part.bound.memory
-        self._calls = self._list(part.blocks, "kernel_calls")
-        self._updates = self._list(part.moore, "update_calls")
+        outputs, updates = tick_calls(part.graph, part.bound.blocks)
+        self._calls, self._updates = self._list(outputs), self._list(updates)
         events = [c for p in part.blocks for c in part.bound.blocks[p].event_calls]
         beside = [call for calls in self._functions.values() for call in calls]
         every = [*(each.call for each in (*self._calls, *self._updates)), *events, *beside]
@@ -125,18 +121,14 @@ class Module:
         self.output_fields, self.output_size = self._struct(part.cut.outputs)
         self.state_size = 16 + sum(each.size for each in self.regions)
 
-    def _list(self, paths: Sequence[str], which: str) -> list[ScheduledCall]:
+    def _list(self, called: Sequence[TickCall]) -> list[ScheduledCall]:
         found = []
-        for path in paths:
-            spec = self.part.graph.block(path)
-            calls = getattr(self.part.bound.blocks[path], which)
-            found += [
-                ScheduledCall(
-                    call, self.part.blocks.index(path), spec.period_ticks,
-                    spec.offset_ticks % spec.period_ticks, call is calls[-1],
-                )
-                for call in calls
-            ]  # fmt: skip
+        for each in called:
+            if each.path not in self.part.blocks:  # what is outside has nothing to do
+                continue
+            calls = getattr(self.part.bound.blocks[each.path], each.calls)
+            number, offset = self.part.blocks.index(each.path), each.offset % each.period
+            found += [ScheduledCall(c, number, each.period, offset, c is calls[-1]) for c in calls]
         return found
 
     def _place(self, array: NDArray[Any]) -> int:

@@ -59,11 +59,6 @@ class SubGraph:
     parameters: tuple[NumberParameter, ...]
     fixed: tuple[str, ...]
 
-    @property
-    def moore(self) -> tuple[str, ...]:
-        """Blocks whose state is updated after all outputs."""
-        return tuple(path for path in self.blocks if type(self.bound.blocks[path]).is_moore())
-
 
 def take_part(
     path: str, part: str = "", overrides: Sequence[str] = (), outputs: Sequence[str] = ()

@@ -9,6 +9,7 @@ import numpy as np
 
 from ....mathematics.arrays import Array1D, Array2D, Flags1D
 from ....mathematics.kernel import kernel
+from ....mathematics.ticks import first_tick
 from ....runtime.language.block import Block, Context, Input, Output, State
 from ....runtime.language.context import Clock
 from ....runtime.language.parameters import Parameters, parameter
@@ -98,9 +99,12 @@ class CommandSchedule(Block):
         rows: CommandRows,
         clock: Clock,
     ) -> None:
-        now = clock.base_period * clock.tick
         number = memory.given
-        if number < rows.at.shape[0] and taken.command >= number and now >= rows.at[number]:
+        if (
+            number < rows.at.shape[0]
+            and taken.command >= number
+            and clock.tick >= first_tick(rows.at[number], clock.base_period)
+        ):
             memory.given = number + 1
         command.number = memory.given
         command.placed, command.replaces = False, False

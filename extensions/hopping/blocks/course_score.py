@@ -156,7 +156,7 @@ class CourseScore(Block):
         if record_fall(truth, record, params, constants):
             scratch.ending = CourseEnding.FELL
         if goal.number == 0:
-            find_place(record, directions)
+            find_landing_position(record, directions)
             record.start[:] = record.middle
             record.start_heading = record.heading
         record_landings(truth, goal, record, directions, params, constants)
@@ -218,7 +218,7 @@ class CourseScore(Block):
 
 
 @kernel
-def find_place(record: CourseRecord, directions: Array2D) -> None:
+def find_landing_position(record: CourseRecord, directions: Array2D) -> None:
     """Find the middle of the feet and how they are turned from their ``directions`` as the robot stands."""
     record.middle[:] = 0.0
     x = y = 0.0
@@ -258,13 +258,13 @@ def record_landings(
     if record.flies or record.measured or record.landed_time == NEVER:
         return
     if record.now - record.landed_time >= params.measure_time:
-        measure_place(record, directions)
+        measure_position(record, directions)
 
 
 @kernel
-def measure_place(record: CourseRecord, directions: Array2D) -> None:
+def measure_position(record: CourseRecord, directions: Array2D) -> None:
     """Compare the place of the feet with the target."""
-    find_place(record, directions)
+    find_landing_position(record, directions)
     x, y = record.middle[0] - record.start[0], record.middle[1] - record.start[1]
     sine, cosine = sincos(record.start_heading)
     dx = cosine * x + sine * y - record.target[0]

@@ -159,7 +159,7 @@ def add_velocity_change(
 
 
 @kernel
-def place_feet(moved: MovedLanding, axis: int, wanted: float, most: float) -> None:
+def move_footholds(moved: MovedLanding, axis: int, wanted: float, most: float) -> None:
     """Let the feet land by as much of ``wanted`` from the plan as they can: within ``most`` of where they are thrown."""
     low, high = moved.thrown[axis] - most, moved.thrown[axis] + most
     moved.landing[axis] = min(max(wanted, low), high)

@@ -68,8 +68,8 @@ from .moved_landing import (
     add_velocity_change,
     begin_swing,
     middle_of,
+    move_footholds,
     move_landing,
-    place_feet,
 )
 from .received_plan import BEHIND, FollowedPlan, ReceivedPlan, receive
 
@@ -502,9 +502,9 @@ def retarget(
     else:
         begin_swing(moved, reference)
         most = params.foothold_limit
-        place_feet(moved, AHEAD, within_ahead, most)
-        place_feet(moved, ASIDE, within_aside, most)
-        place_feet(moved, TURN, within_turn, params.foothold_turn)
+        move_footholds(moved, AHEAD, within_ahead, most)
+        move_footholds(moved, ASIDE, within_aside, most)
+        move_footholds(moved, TURN, within_turn, params.foothold_turn)
     moved.moves += 1
     u, v = moved.landing[AHEAD] - before_ahead, moved.landing[ASIDE] - before_aside
     memory.goal[0], memory.goal[1] = x + cosine * u - sine * v, y + sine * u + cosine * v

@@ -132,7 +132,7 @@ class SteppingStones(Block):
     ``SteeredPlan``). ``seen`` holds the next stones, for a planner that looks further ahead. Stones are
     ``placed`` commands: their places are those of the world, and do not depend on where earlier jumps have landed.
 
-    The robot takes its ground from here, so stones are given once: ``robot.scene: {from: commands.scene}``.
+    The robot takes its ground from here, so stones are given once: ``robot.ground.scene: {from: commands.scene}``.
     It begins on a larger stone. Between the stones there is nothing to stand on.
 
     The robot takes the heights as given; nothing measures them.

@@ -9,6 +9,7 @@ from pydantic import field_validator
 
 from ....mathematics.arrays import Array1D, Array2D
 from ....mathematics.kernel import kernel
+from ....mathematics.ticks import first_tick
 from ....runtime.language.block import Block, Output
 from ....runtime.language.context import Clock
 from ....runtime.language.parameters import Parameters, parameter
@@ -58,10 +59,9 @@ class TwistSchedule(Block):
     @kernel
     @staticmethod
     def step(twist: BodyTwist, rows: TwistRows, clock: Clock) -> None:
-        now = clock.base_period * clock.tick
         twist.linear[:] = 0.0
         twist.angular[:] = 0.0
         for row in range(rows.at.shape[0]):
-            if now >= rows.at[row]:
+            if clock.tick >= first_tick(rows.at[row], clock.base_period):
                 twist.linear[0], twist.linear[1] = rows.twists[row, 0], rows.twists[row, 1]
                 twist.angular[2] = rows.twists[row, 2]

@@ -27,7 +27,7 @@ _WIDE = frozenset("mwMWABCDGHNOQRUVXYZ%@_")
 
 
 def width_of(text: str, size: float) -> float:
-    """About how wide a text is; fonts differ a little."""
+    """Estimate the width of a text; fonts differ a little."""
     units = sum(0.36 if c in _NARROW else 0.74 if c in _WIDE else 0.585 for c in text)
     return units * size
 

@@ -6,7 +6,7 @@ import pytest
 from aloft.hal.simulated.scenes import step
 from aloft.lab.figures.strip import Moment, Motion, draw_strip, moments_of
 from aloft.robots.description import find_robot
-from aloft.runtime.language.terrain import Terrain
+from aloft.robots.terrain import Terrain
 from aloft.studies import offscreen
 from aloft.studies.offscreen import NoRendererError, Offscreen, View
 

@@ -136,6 +136,7 @@ def check_fit(draft: BlockDraft, settings: Settings, problems: Problems) -> None
         wired=tuple(flat.wires),
         folder=flat.folder,
         graph_folder=settings.folder,
+        duration=None if settings.ticks is None else settings.ticks / (settings.base_rate or 1.0),
     )
     for requirement in unmet_requirements(draft.block_type, draft.params, context):
         report_requirement(draft, requirement, problems)

@@ -302,7 +302,11 @@ class _WireComposer:
         block_type = gather_block_type(
             tuple(self.pieces),
             self.inputs,
-            selected_signal(self.signal.__name__, self.fields),
+            selected_signal(
+                self.signal.__name__,
+                self.fields,
+                [name for name, field in self.signal.fields.items() if field.quaternion],
+            ),
             {
                 name: q if q is not None and q.unit is not None else None
                 for name, q in wanted.items()

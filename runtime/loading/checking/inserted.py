@@ -6,7 +6,7 @@ for each wire that is composed of parts of other signals.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar
@@ -131,12 +131,22 @@ def gather_block_type(
     return type("Gather", (Gather,), body)
 
 
-def selected_signal(name: str, fields: Mapping[str, tuple[tuple[int, ...], str]]) -> type[Signal]:
-    """Return a signal whose fields have these shapes and types, and carry their units."""
+def selected_signal(
+    name: str,
+    fields: Mapping[str, tuple[tuple[int, ...], str]],
+    quaternions: Container[str] = (),
+) -> type[Signal]:
+    """Return a signal whose fields have these shapes and types, and carry their units.
+
+    ``quaternions`` names the fields that are quaternions where they have four numbers last.
+    """
     body: dict[str, Any] = {
-        field: Field(shape, dtype=dtype, inferred=True, text="what was selected")
+        field: Field(
+            shape, dtype=dtype, inferred=True, text="what was selected",
+            quaternion=field in quaternions and shape[-1:] == (4,) and dtype == "float64",
+        )
         for field, (shape, dtype) in fields.items()
-    }
+    }  # fmt: skip
     return type(name, (Signal,), {"__doc__": "Parts of other signals.", **body})
 
 
@@ -147,7 +157,7 @@ class ConstantParameters(Parameters):
 
 
 class ConstantSignal(Block):
-    """Holds constant values: y[n] = value, and zero in the fields that are not named.
+    """Holds constant values: y[n] = value, and zero in the fields that are not named, or no turn.
 
     A graph makes it by ``{value: {field: number}}`` in place of a source. Subclasses made by
     ``constant_block_type`` fix the signal. It raises no errors: the values are checked at load.

@@ -10,12 +10,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from ....files.nodes import Entry, MapNode, Node, ScalarNode, from_plain
+from ....files.nodes import MapNode, Node, ScalarNode, from_plain
 from ....files.problems import Code, Problems, listing, nearest
 from ....files.validation import unit_of
 from ...language.block import Block, Clock, Context, UnmetRequirement
 from ...language.flat_graph import FlatBlock, FlatGraph
-from ...language.parameters import Parameters
+from ...language.parameters import Parameters, declared_fields
 from ...language.registry import find_block
 from ...language.requirements import unmet_requirements
 from .parameters import check_parameters, plain_parameters
@@ -35,14 +35,37 @@ def resolve_references(graph: FlatGraph, settings: Settings, problems: Problems)
     return _ReferenceResolver(graph, settings, problems).resolved()
 
 
-def _references(block: FlatBlock) -> Iterator[tuple[Entry, ScalarNode]]:
-    """Yield the parameters of a block that are ``{from: text}``, each with the text."""
-    for entry in block.parameters:
-        node = entry.value
-        if isinstance(node, MapNode) and node.keys() == (KEY,):
-            source = node.entries[0].value
-            if isinstance(source, ScalarNode) and isinstance(source.value, str):
-                yield entry, source
+def _references(block: FlatBlock) -> Iterator[tuple[tuple[str, ...], ScalarNode]]:
+    """Yield the parameters of a block, and in its groups, that are ``{from: text}``: the path and the text of each."""
+    return _references_in(block.parameters, ())
+
+
+def _references_in(
+    node: MapNode, path: tuple[str, ...]
+) -> Iterator[tuple[tuple[str, ...], ScalarNode]]:
+    for entry in node:
+        inner, at = entry.value, (*path, entry.key)
+        if not isinstance(inner, MapNode):
+            continue
+        source = inner.entries[0].value if inner.keys() == (KEY,) else None
+        if isinstance(source, ScalarNode) and isinstance(source.value, str):
+            yield at, source
+        else:
+            yield from _references_in(inner, at)
+
+
+def _with_value(node: MapNode, path: tuple[str, ...], value: Node | None) -> MapNode:
+    """Return the mapping with another value at a path; without the key where the value is ``None``."""
+    entries = []
+    for entry in node:
+        if entry.key != path[0]:
+            entries.append(entry)
+        elif len(path) > 1:
+            assert isinstance(entry.value, MapNode)
+            entries.append(replace(entry, value=_with_value(entry.value, path[1:], value)))
+        elif value is not None:
+            entries.append(replace(entry, value=value))
+    return replace(node, entries=tuple(entries))
 
 
 class _ReferenceResolver:
@@ -69,22 +92,19 @@ class _ReferenceResolver:
             return self.done[path]
         block = self.blocks[path]
         block_type = self.type_of(block)
-        kept = {entry.key: entry for entry in block.parameters}
-        for entry, source in _references(block):
-            del kept[entry.key]
-            node = self.value(block, block_type, entry, source, (*waiting_blocks, path))
-            if node is not None:
-                kept[entry.key] = replace(entry, value=node)
-        entries = tuple(kept[entry.key] for entry in block.parameters if entry.key in kept)
-        self.done[path] = replace(block, parameters=replace(block.parameters, entries=entries))
+        parameters = block.parameters
+        for place, source in _references(block):
+            node = self.value(block, block_type, ".".join(place), source, (*waiting_blocks, path))
+            parameters = _with_value(parameters, place, node)
+        self.done[path] = replace(block, parameters=parameters)
         return self.done[path]
 
     def value(
-        self, reader: FlatBlock, block_type: type[Block] | None, entry: Entry,
+        self, reader: FlatBlock, block_type: type[Block] | None, parameter: str,
         source: ScalarNode, waiting_blocks: tuple[str, ...],
     ) -> Node | None:  # fmt: skip
         """Return the value that replaces a reference; ``None`` where it is not known."""
-        at = f"{reader.path}.{entry.key}"
+        at = f"{reader.path}.{parameter}"
         path, what = self.source_of(reader, source)
         if not path:
             name = str(source.value).rpartition(".")[0]
@@ -125,7 +145,7 @@ class _ReferenceResolver:
             )
             return None
         own = unit_of(info) if block_type and (
-            info := block_type.Params.model_fields.get(entry.key)) else unit  # fmt: skip
+            info := dict(declared_fields(block_type.Params)).get(parameter)) else unit  # fmt: skip
         if unit and own and unit != own:
             self.problems.add(
                 Code.UNIT,

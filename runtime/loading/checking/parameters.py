@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from pydantic import ValidationError
+from pydantic.fields import FieldInfo
 
 from ....files.nodes import (
     MapNode,
@@ -26,7 +27,7 @@ from ....robots.description import RobotDescription
 from ...language.block import Block
 from ...language.flat_graph import FlatBlock
 from ...language.parameter_change import Adjustment
-from ...language.parameters import Parameters, is_live
+from ...language.parameters import Parameters, declared_fields, group_of, is_live
 from ...language.per_joint import BY_POSITION, by_name
 from ...language.registry import block_name
 from ...language.requirements import unmet_requirements
@@ -66,20 +67,29 @@ def check_parameters(
 def _refuse_truth_values(flat: FlatBlock, model: type[Parameters], problems: Problems) -> bool:
     """Report ``true`` or ``false`` in place of a number, which pydantic would take for 1 or 0."""
     ok = True
-    for entry in flat.parameters:
-        info = model.model_fields.get(entry.key)
-        value = entry.value.value if isinstance(entry.value, ScalarNode) else None
-        if info is not None and isinstance(value, bool) and info.annotation in (int, float):
+    numbers = {n: info for n, info in declared_fields(model) if info.annotation in (int, float)}
+    for path, node in _values(flat.parameters):
+        info, value = numbers.get(path), node.value
+        if info is not None and isinstance(value, bool):
             ok = False
             problems.add(
                 Code.BAD_PARAMETER,
-                f"{flat.path}.{entry.key} cannot be {kind(entry.value)}",
-                entry.value.where,
-                at=f"{flat.path}.{entry.key}",
-                expected=_with_text("a number", model, entry.key),
+                f"{flat.path}.{path} cannot be {kind(node)}",
+                node.where,
+                at=f"{flat.path}.{path}",
+                expected=_with_text("a number", info),
                 found=text_of(value),
             )
     return ok
+
+
+def _values(node: MapNode, prefix: str = "") -> Iterator[tuple[str, ScalarNode]]:
+    """Yield the single values in a mapping and in those within it, by path."""
+    for entry in node:
+        if isinstance(entry.value, MapNode):
+            yield from _values(entry.value, f"{prefix}{entry.key}.")
+        elif isinstance(entry.value, ScalarNode):
+            yield f"{prefix}{entry.key}", entry.value
 
 
 def _refuse_beyond_64_bits(
@@ -103,7 +113,9 @@ def _refuse_beyond_64_bits(
                 f"{flat.path}.{entry.key} does not fit into 64 bits",
                 entry.value.where,
                 at=f"{flat.path}.{entry.key}",
-                expected=_with_text("a whole number below 2^63", block_type.Params, entry.key),
+                expected=_with_text(
+                    "a whole number below 2^63", block_type.Params.model_fields.get(entry.key)
+                ),
                 found=text_of(value),
             )
     return ok
@@ -120,11 +132,12 @@ def _report(
     model = block_type.Params
     for mistake in find_mistakes(error, model, flat.parameters):
         name = str(mistake.location[0]) if mistake.location else ""
+        info = _declaration(model, mistake.location)
         place = ".".join([flat.path, *([path_text(mistake.path)] if mistake.path else [])])
         expected = " or ".join(mistake.expected)
         if mistake.code is Code.MISSING_PARAMETER:
             message = f"{flat.path} ({flat.use}) needs the parameter {mistake.key!r}"
-            expected = _with_text(expected, model, name)
+            expected = _with_text(expected, info)
             if len(mistake.path) == 1:
                 mistake.fix = f"with: {{{mistake.key}: ...}}"
         elif mistake.code is Code.UNKNOWN_PARAMETER:
@@ -138,7 +151,7 @@ def _report(
         if mistake.reasons:
             message = f"{message}: {'; '.join(mistake.reasons)}"
         if mistake.code is Code.BAD_PARAMETER and expected:
-            expected = _with_text(expected, model, name)
+            expected = _with_text(expected, info)
         problems.add(
             mistake.code,
             message,
@@ -161,9 +174,20 @@ def _by_name(node: Node, robot: RobotDescription | None) -> str:
     return "{" + ", ".join(f"{name}: ..." for name in names) + "}"
 
 
-def _with_text(expected: str, model: type[Parameters], name: str) -> str:
+def _declaration(model: type[Parameters], location: Sequence[str | int]) -> FieldInfo | None:
+    """Return the declaration of the parameter at a location, which may be in a group."""
+    info = None
+    for name in location:
+        info = model.model_fields.get(str(name), info)
+        group = None if info is None else group_of(info)
+        if group is None:
+            break
+        model = group
+    return info
+
+
+def _with_text(expected: str, info: FieldInfo | None) -> str:
     """Return the expectation, with the parameter's unit and its line of text."""
-    info = model.model_fields.get(name)
     expected = with_unit(expected, unit_of(info))
     return f"{expected} ({info.description})" if info and info.description else expected
 

@@ -21,7 +21,7 @@ from aloft.blocks.signals import JumpReference, Phase
 from aloft.robots import five_joint_leg
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import ball_feet
-from aloft.robots.limb import place_limb, read_limb
+from aloft.robots.limb import read_limb, set_limb_pose
 from aloft.runtime.language.context import Clock, Context
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
@@ -273,7 +273,7 @@ def placed(robot, joints):
     for foot in range(len(robot.feet)):
         limb, pose = read_limb(robot, foot), np.zeros((4, 3))
         angles = np.asarray(joints)[list(limb.joints)]
-        place_limb(limb.links, limb.tip, angles, np.zeros((len(angles), 6)), pose)
+        set_limb_pose(limb.links, limb.tip, angles, np.zeros((len(angles), 6)), pose)
         places.append(pose[0].copy())
         turns.append(pose[1:].copy())
     for ball in ball_feet(robot):  # the lowest point of a ball, which has no orientation

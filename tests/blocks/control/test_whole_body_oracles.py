@@ -28,7 +28,7 @@ ONE_FOOT = np.array([True, True, False, False])
 ONE_POINT = np.array([False, False, False, True])
 JUMPS = {
     "as shipped": {},
-    "slipping": {"robot.friction": 0.35, "wbc.friction": 0.1},
+    "slipping": {"robot.ground.friction": 0.35, "wbc.friction": 0.1},
     "torque-limited": {"wbc.torque_margin": 0.35},
     "another seed": {"robot.seed": 7001},
 }

@@ -152,7 +152,7 @@ def test_before_any_measurement_it_is_the_description():
 @pytest.mark.parametrize("scale", [0.9, 1.1])
 def test_in_a_noisy_world_at_the_end_of_the_squat(scale):
     settings = {
-        "robot.mass_scale": scale, "robot.base_com_offset": [0.008, 0.0, 0.0], "robot.seed": 4,
+        "robot.body.mass_scale": scale, "robot.body.base_com_offset": [0.008, 0.0, 0.0], "robot.seed": 4,
         "duration": 0.8,
     }  # fmt: skip
     found = aloft.load(GRAPH, settings).run(log=False).metrics

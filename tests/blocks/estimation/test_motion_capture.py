@@ -103,3 +103,16 @@ def test_noise_is_averaged() -> None:
         bench.step()
         errors.append(np.array(bench.get("base").position)[:2] - [0.1, 0.2])
     assert np.std(errors[500:]) == pytest.approx(0.005 * math.sqrt(0.02 / 2.0), rel=0.3)
+
+
+def test_a_system_that_begins_again_is_used_again() -> None:
+    bench = BlockBench(PoseCorrection, {"gain": 1.0})
+    for tick in range(20):
+        number = tick + 1 if tick < 10 else tick - 8  # from 10 back to 2
+        bench.set("state", orientation=turned(0.0))
+        bench.set("pose", number=number, time=PERIOD * tick, position=[0.1 * tick, 0.0, 0.0])
+        bench.step()
+        assert bench.get("base").position[0] == pytest.approx(0.1 * tick)
+    bench.set("pose", number=3, time=PERIOD * 5, position=[9.0, 0.0, 0.0])  # one that comes late
+    bench.step()
+    assert bench.get("base").position[0] == pytest.approx(1.9)

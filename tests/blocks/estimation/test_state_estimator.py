@@ -14,6 +14,7 @@ from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing import BlockBench
 
+from ...simulator_settings import grouped
 from ...turns import quaternion_of, turn_between
 
 ROBOT = find_robot("bruce")
@@ -349,7 +350,7 @@ def hop(time):
 def simulate(seed, kind=StateEstimator, **params):
     """Errors of the estimator while a robot hops: velocity and attitude at lift-off and touchdown,
     then position at touchdown."""
-    robot = BlockBench(MujocoRobot, {"seed": seed, **STANDARD_NOISE}, robot="bruce")
+    robot = BlockBench(MujocoRobot, grouped({"seed": seed, **STANDARD_NOISE}), robot="bruce")
     estimator = BlockBench(kind, params, robot="bruce")
     opened, flying, found = np.zeros(4), False, {}
     for tick in range(800):

@@ -4,8 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation, Slerp
 
+import aloft
 from aloft.blocks.general.rotations import (
     EulerToQuaternion,
     MatrixToQuaternion,
@@ -14,6 +17,7 @@ from aloft.blocks.general.rotations import (
     QuaternionToMatrix,
     RotateVector,
 )
+from aloft.mathematics.rotations import between
 from aloft.runtime.testing import BlockBench
 
 
@@ -69,3 +73,38 @@ def test_yaw_is_about_z() -> None:
     bench.step()
     expected = [0.0, 0.0, math.sin(0.3), math.cos(0.3)]
     np.testing.assert_allclose(bench.get("y").value, expected, atol=1e-15)
+
+
+IDENTITY = [0.0, 0.0, 0.0, 1.0]
+BEFORE = """
+rate: 500 Hz
+duration: 20 ms
+blocks:
+  angles: {use: blocks.Constant, with: {value: [0.2 rad, -0.1 rad, 1.0 rad]}}
+  q: {use: blocks.EulerToQuaternion, in: {u: angles.y}}
+  slow: {use: blocks.EulerToQuaternion, in: {u: angles.y}, rate: 100 Hz, offset: 3}
+  error: {use: blocks.QuaternionProduct, with: {inverse: true}, in: {a: {from: q.y, delay: 2}, b: q.y}}
+  part: {use: blocks.QuaternionProduct, in: {a: {from: q.y.value, delay: 1}, b: slow.y.value}}
+  given: {use: blocks.QuaternionProduct, in: {a: {from: q.y, delay: 1, initial: {value: [1, 0, 0, 0]}}, b: slow.y}}
+"""
+
+
+def test_a_rotation_before_its_first_value_is_none() -> None:
+    run = aloft.load(BEFORE).run()
+    q = run.signal("q.y.value")[0]
+    assert run.signal("slow.y.value")[:4] == pytest.approx(np.array([IDENTITY] * 3 + [q]))
+    assert run.signal("error.y.value")[:3] == pytest.approx(np.array([q, q, IDENTITY]))
+    assert run.signal("part.y.value")[:3] == pytest.approx(np.array([IDENTITY, q, q]))
+    assert run.signal("given.y.value")[0] == pytest.approx([1.0, 0.0, 0.0, 0.0])
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**31), st.floats(0.0, 1.0))
+def test_between_two_rotations_it_is_scipys(seed: int, share: float) -> None:
+    ends = Rotation.random(2, rng=seed)
+    expected = Slerp([0.0, 1.0], ends)(share)
+    a, b = ends.as_quat()
+    found = np.zeros(4)
+    for sign in (1.0, -1.0):
+        between(a, sign * b, share, found)
+        assert (Rotation.from_quat(found) * expected.inv()).magnitude() < 1e-12

@@ -89,6 +89,17 @@ def test_a_pulse_has_as_many_high_ticks_as_its_width_says(
     assert found == ([1.0] * high + [0.0] * (period - high)) * 10
 
 
+@pytest.mark.parametrize("hours", [0, 10, 100])
+def test_pulses_keep_their_ticks_for_hours(hours: int) -> None:
+    bench = BlockBench(Pulse, {"duration": "1 ms", "width": 0.375}, rate=8000.0)
+    found = []
+    for tick in range(hours * 3600 * 8000, hours * 3600 * 8000 + 80):
+        bench.clock.tick = tick
+        bench.step()
+        found.append(bench.get("y").value[0])
+    assert found == [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0] * 10
+
+
 def test_sine_wave_follows_time() -> None:
     bench = BlockBench(
         SineWave, {"n": 2, "amplitude": 2.0, "frequency": "50 Hz", "offset": 1.0}, rate=1000.0

@@ -14,7 +14,7 @@ from aloft.blocks.signals import Phase
 from aloft.mathematics.landing_law import (
     apply_lead,
     keep_within,
-    landing_place,
+    landing_position,
     retraction,
     swing,
 )
@@ -45,7 +45,7 @@ def place(
     centre=(0.0, 0.0, 0.0),
 ):
     out = np.zeros(3)
-    landing_place(
+    landing_position(
         np.array(nominal), side, np.array(linear), np.array(angular), np.array(w_l),
         np.array(w_k), w_c, np.array([0.15, 0.16]), np.asarray(centre), out,
     )  # fmt: skip

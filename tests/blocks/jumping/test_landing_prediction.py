@@ -13,7 +13,7 @@ from aloft.blocks.control.dynamics import Dynamics
 from aloft.blocks.jumping.landing_heuristic import LandingHeuristic
 from aloft.blocks.signals import Phase
 from aloft.mathematics.constants import GRAVITY
-from aloft.mathematics.landing_law import pull_to_place
+from aloft.mathematics.landing_law import pull_to_position
 from aloft.mathematics.rotations import to_matrix
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import standing_feet
@@ -28,7 +28,7 @@ MASS = ROBOT.total_mass
 @given(*[st.floats(-0.2, 0.2)] * 4)
 def test_of_the_way_from_the_planned_place_to_the_capture_point_a_share_is_taken_back(x, y, ox, oy):
     goal, miss = np.array([x, y, 0.3]), np.array([ox, oy, 0.1])
-    pull_to_place(goal, miss, 0.5, 0.04)
+    pull_to_position(goal, miss, 0.5, 0.04)
     way = np.array([x + ox, y + oy])
     share = 0.5 / (1.0 + (np.linalg.norm(way) / 0.04) ** 4)
     assert goal[:2] == pytest.approx([x, y] - share * way, abs=1e-12)

@@ -30,7 +30,7 @@ from aloft.hal.bear.bus import open_port
 from aloft.hal.bear.configuration import Hardware, HardwareError
 from aloft.hal.bear.driven_robot import read_hardware
 from aloft.hal.bear.protocol import Instruction, frame_bytes
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.twin.injected_faults import InjectedFault
 from aloft.hal.twin.server import TwinServer
 from aloft.hal.twin.twin import standing_twin

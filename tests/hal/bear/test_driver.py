@@ -16,7 +16,7 @@ from aloft.hal.bear.bus import BusError
 from aloft.hal.bear.configuration import Hardware
 from aloft.hal.bear.driver import DriveLaw, Driver, check_ready, configure
 from aloft.hal.bear.motor_loop import MotorThread
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.twin.twin import Twin, standing_twin
 from aloft.hal.twin.twin_robot import VirtualBoardPort, VirtualBusPort
 from aloft.robots.description import find_robot
@@ -142,7 +142,10 @@ def test_a_motor_far_from_the_standing_pose_is_not_enabled() -> None:
 @pytest.mark.parametrize(
     ("lacking", "text"),
     [
-        ({"offset": None}, "left_knee_motor: not calibrated, an `offset`: do step 3 of docs/bring"),
+        (
+            {"offset": None},
+            "left_knee_motor: not calibrated, an `offset`: do step 3 of extensions/commissioning/bring",
+        ),
         ({"high": None}, "left_knee_motor: not calibrated, `low` and `high`: do step 4 of docs/"),
     ],
 )

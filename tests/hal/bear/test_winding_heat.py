@@ -78,13 +78,13 @@ def test_the_load_of_a_kept_plan_is_read_without_the_plan() -> None:
 def test_a_twin_is_armed_by_what_its_plan_heats() -> None:
     """Of 71 deg C a jump of 12 cm leaves room, which a flat 5 K would not."""
     graph = aloft.load(
-        GRAPHS / "jump_twin.yaml", overrides={"robot.windings": {"temperature": 71.0}}
+        GRAPHS / "jump_twin.yaml", overrides={"robot.actuators.windings": {"temperature": 71.0}}
     )
     task = read_task(GRAPHS / "tasks" / "in_situ_12cm.yaml")
     spec = next(block for block in graph.checked.blocks if block.path == "robot")
     assert spec.params.planned_load == PlanLibrary(ROBOT).load_of(task)  # type: ignore[attr-defined]
     assert graph.changed({"duration": "0.1 s"}).run(log=False).ticks == 50
-    warmer = graph.changed({"robot.windings.temperature": 74.0}).run(log=False)
+    warmer = graph.changed({"robot.actuators.windings.temperature": 74.0}).run(log=False)
     assert not warmer.success
     text = r"left_knee_motor has 73\.\d deg C, and the plan heats it by 3\.0 to 76\.\d: more than 75; wait \d s"
     assert re.search(text, warmer.reason) and "ankle" not in warmer.reason

@@ -12,6 +12,7 @@ from aloft.hal.twin.twin_robot import TwinRobot
 from aloft.mathematics.constants import GRAVITY
 from aloft.runtime.testing.bench import BlockBench
 
+from ...simulator_settings import grouped
 from .mounting import bruce_with, hold
 
 SOLE = [0.0075, 0.0, -0.024]
@@ -28,7 +29,7 @@ def sole(side: str, noise: Any = None) -> dict[str, Any]:
 
 def bench(kind: type[Any] = MujocoRobot, noise: Any = None, **params: Any) -> BlockBench[Any]:
     robot = bruce_with(right_sole=sole("right", noise), left_sole=sole("left", noise))
-    return BlockBench(kind, params, robot=robot)
+    return BlockBench(kind, grouped(params), robot=robot)
 
 
 def frames(robot: BlockBench[Any]) -> dict[str, tuple[Any, Any]]:

@@ -17,6 +17,7 @@ from aloft.hal.twin.twin_robot import TwinRobot
 from aloft.robots.description import RobotError
 from aloft.runtime.testing.bench import BlockBench
 
+from ...simulator_settings import grouped
 from .mounting import bruce_with, hold, write_bruce_with
 
 FOOT_IMU: dict[str, Any] = {
@@ -58,7 +59,9 @@ def test_declared_errors_and_the_factor_on_them() -> None:
     bias = robot.block.plant.sensors.mounted[0].bias("specific_force")
     assert 0.02 < np.abs(bias).max() <= 0.2
     np.testing.assert_allclose(forces.mean(axis=0) - bias, [0, 0, 9.81], atol=0.01)
-    ideal = BlockBench(MujocoRobot, {"sensor_errors": 0.0}, robot=bruce_with(foot_imu=FOOT_IMU))
+    ideal = BlockBench(
+        MujocoRobot, {"sensors": {"sensor_errors": 0.0}}, robot=bruce_with(foot_imu=FOOT_IMU)
+    )
     assert not ideal.block.plant.sensors.mounted[0].bias("specific_force").any()
 
 
@@ -83,8 +86,8 @@ def test_machine_code_and_snapshots_give_the_same_bytes(kind: type[Any]) -> None
 
 def test_other_sensors_read_the_same_beside_it() -> None:
     noise = {"gyro_noise": 0.02, "joint_velocity_noise": 0.05, "encoder_offset": 0.003, "seed": 2}
-    with_it = BlockBench(MujocoRobot, noise, robot=bruce_with(foot_imu=FOOT_IMU))
-    without = BlockBench(MujocoRobot, noise, robot="bruce")
+    with_it = BlockBench(MujocoRobot, grouped(noise), robot=bruce_with(foot_imu=FOOT_IMU))
+    without = BlockBench(MujocoRobot, grouped(noise), robot="bruce")
     for robot in (with_it, without):
         hold(robot)
         robot.step(20)

@@ -8,9 +8,11 @@ from aloft.blocks.signals import CommandMode
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.runtime.testing.bench import BlockBench
 
+from ...simulator_settings import grouped
+
 
 def bench(rate: float = 500.0, **params: Any) -> BlockBench[MujocoRobot]:
-    return BlockBench(MujocoRobot, params, robot="bruce", rate=rate)
+    return BlockBench(MujocoRobot, grouped(params), robot="bruce", rate=rate)
 
 
 def hold(robot: BlockBench[MujocoRobot]) -> None:

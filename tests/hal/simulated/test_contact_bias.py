@@ -9,9 +9,9 @@ import pytest
 from aloft.hal.simulated.base import BASES
 from aloft.hal.simulated.contact_bias import ContactBias
 from aloft.hal.simulated.mujoco_model import build_mujoco_model
-from aloft.hal.simulated.plant import step_calls
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
-from aloft.hal.simulated.stance import place_standing
+from aloft.hal.simulated.parameters import SimulatorParameters
+from aloft.hal.simulated.physics_step import step_calls
+from aloft.hal.simulated.stance import set_standing_pose
 from aloft.hal.simulated.variation import Variation
 from aloft.mathematics.arrays import Array
 from aloft.robots.description import find_robot
@@ -44,7 +44,7 @@ def test_the_bias_is_what_the_jacobians_change_by(name: str) -> None:
 
 def slide(scene: str, *, contact_bias: bool) -> float:
     """How fast [m/s] the soles of a robot slide whose legs fold at 6 rad/s, 10 ms after they stood."""
-    params = SimulatorParameters(scene=scene, platform_edge=0.5)  # type: ignore[arg-type]
+    params = SimulatorParameters.model_validate({"ground": {"scene": scene, "platform_edge": 0.5}})
     model = build_mujoco_model(
         ROBOT, scene=params.build_scene(ROBOT), variation=Variation(contact_stiffness=0.25)
     )
@@ -72,7 +72,7 @@ def place_standing_on(
 ) -> None:
     base = BASES[ROBOT.base_joint](data)
     normal = params.build_scene(ROBOT).normal(0.0, 0.0)
-    place_standing(model, data, base, ROBOT, np.zeros(3), False, normal)
+    set_standing_pose(model, data, base, ROBOT, np.zeros(3), False, normal)
     base.shift(np.array([0.0, 0.0, -2e-4]))
     mujoco.mj_step1(model, data)
 

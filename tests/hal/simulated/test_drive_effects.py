@@ -13,7 +13,7 @@ import pytest
 import aloft
 from aloft.files.problems import LoadError
 from aloft.hal.simulated.battery import Battery
-from aloft.hal.simulated.drive_effects import DriveEffects
+from aloft.hal.simulated.drive_effects import EncoderDelays, MotorLosses
 from aloft.hal.simulated.drives import MotorLimits
 from aloft.hal.simulated.effects import (
     BatteryParameters,
@@ -38,20 +38,16 @@ SIZES = dict.fromkeys(
 )  # fmt: skip
 
 
-def drives(encoders: Any = (), motors: Any = ()) -> tuple[DriveEffects, PhysicsState]:
-    chosen = (
-        EncoderEffects.model_validate(dict(encoders)),
-        MotorEffects.model_validate(dict(motors)),
-    )
-    memory = PhysicsState.allocate({**SIZES, **DriveEffects.dimensions(ROBOT, *chosen, STEP)})
-    return DriveEffects(ROBOT, *chosen, 5, STEP, memory), memory
+def memory_of(**sizes: int) -> PhysicsState:
+    return PhysicsState.allocate({**SIZES, **sizes})
 
 
 def reader(**encoders: Any) -> Any:
     """What the encoders read of a joint motion and torque."""
-    effects, memory = drives(encoders)
+    effects = EncoderEffects.model_validate(encoders)
+    memory = memory_of(**EncoderDelays.dimensions(ROBOT, effects, STEP))
     true = SimpleNamespace(q=np.zeros(N), v=np.zeros(N), torque=np.zeros(N))
-    call = effects.sensing(true.q, true.v, true.torque)
+    call = EncoderDelays(ROBOT, effects, 5, STEP, memory).sense_call(true.q, true.v, true.torque)
 
     def read(q: float, v: float, torque: float = 0.0) -> tuple[float, float]:
         true.q[:], true.v[:], true.torque[:] = q, v, torque
@@ -63,10 +59,12 @@ def reader(**encoders: Any) -> Any:
 
 def giver(velocity: float = 0.0, angle: float = 0.0, **motors: Any) -> Any:
     """What the motors give of the torques that are asked of them."""
-    effects, _ = drives((), motors)
+    losses = MotorLosses(
+        ROBOT, MotorEffects.model_validate(motors), 5, STEP, memory_of(n_real_motors=N)
+    )
     position, speed = np.full(N, angle), np.full(N, velocity)
     asked, torque = np.zeros(N), np.zeros(N)
-    call = effects.producing(position, speed, asked, torque)
+    call = losses.produce_call(position, speed, asked, torque)
 
     def give(requested: np.ndarray | float) -> np.ndarray:
         asked[:] = requested
@@ -198,7 +196,7 @@ def test_two_bodies_swing_with_the_period_of_the_closed_form() -> None:
     q, v, torque = np.zeros(N), np.zeros(N), np.zeros(N)
     model.begin(q)
     memory.rotor_angle[:] = 0.01
-    call = model.turning(q, v, torque)
+    call = model.turn_call(q, v, torque)
     matrix = ROBOT.joint_to_motor
     twists = []
     for _ in range(3000):
@@ -222,7 +220,7 @@ def test_within_its_play_a_gear_passes_nothing() -> None:
     model, memory = gears(1e-3, STEP, stiffness=500.0, damping=1.0, backlash=0.02)
     q, v, torque = np.zeros(N), np.zeros(N), np.zeros(N)
     model.begin(q)
-    call = model.turning(q, v, torque)
+    call = model.turn_call(q, v, torque)
     for twist, passed in ((0.009, 0.0), (-0.009, 0.0), (0.012, 1.0), (-0.012, -1.0)):
         memory.rotor_angle[:], memory.rotor_speed[:], torque[:] = twist, 0.0, 0.0
         call.run()
@@ -257,9 +255,9 @@ def pack(
     chosen = BatteryParameters.model_validate(params)
     memory = PhysicsState.allocate({**SIZES, "n_battery": 4})
     battery = Battery(chosen, robot, STEP, memory)
-    battery.begin()
+    battery.begin(np.zeros(N))
     limits = MotorLimits(ROBOT, TickRecord.allocate({**ROBOT.dimensions}))
-    calls = CallSequence([battery.feeding(limits), battery.limiting(limits)])
+    calls = CallSequence([battery.feed_call(limits), battery.limit_call(limits)])
     return battery, memory, limits, calls
 
 
@@ -297,7 +295,7 @@ def test_copper_heat_follows_from_speeds_where_no_winding_is_known() -> None:
 def test_a_robot_whose_supply_nobody_described_has_no_pack() -> None:
     graph = Path(aloft.__file__).parent / "graphs" / "robots" / "a1_stand.yaml"
     with pytest.raises(LoadError) as caught:
-        aloft.load(graph, overrides={"robot.battery": {}})
+        aloft.load(graph, overrides={"robot.actuators.battery": {}})
     text = str(caught.value)
     assert "the description of a1 does not say what feeds it" in text
     assert "supply: {rated_voltage: ..., open_voltage:" in text

@@ -22,6 +22,8 @@ from aloft.robots.transmission import TransmissionMap, motor_gains
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing.bench import BlockBench
 
+from ...simulator_settings import grouped
+
 ROBOT = find_robot("bruce")
 N = len(ROBOT.joints)
 FLIGHT = {
@@ -157,7 +159,7 @@ def test_they_give_the_joints_what_the_twins_drives_give() -> None:
 
 
 def bench(**params: Any) -> BlockBench[MujocoRobot]:
-    return BlockBench(MujocoRobot, params, robot="bruce")
+    return BlockBench(MujocoRobot, grouped(params), robot="bruce")
 
 
 def test_it_stands_with_the_loops_of_its_motors() -> None:

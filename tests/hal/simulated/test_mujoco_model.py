@@ -8,7 +8,7 @@ import pytest
 
 from aloft.hal.simulated import mujoco_model
 from aloft.hal.simulated.mujoco_model import build_world
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.simulated.variation import Variation
 from aloft.robots.description import Hull, find_robot
 
@@ -53,7 +53,9 @@ def test_what_is_in_the_model_makes_another_world(built: list[str]) -> None:
     others = [
         build_world(FLAT, ROBOT, Variation(mass=1.1)),
         build_world(FLAT.model_copy(update={"timestep": 0.001}), ROBOT, Variation()),
-        build_world(FLAT.model_copy(update={"scene": "step"}), ROBOT, Variation()),
+        build_world(
+            SimulatorParameters.model_validate({"ground": {"scene": "step"}}), ROBOT, Variation()
+        ),
         build_world(FLAT, find_robot("bruce").model_copy(update={"name": "other"}), Variation()),
     ]
     assert built == ["bruce"] * 4 + ["other"]

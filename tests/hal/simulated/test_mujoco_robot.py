@@ -137,7 +137,7 @@ def test_latency_is_exact_to_the_physics_step(latency: float, ticks: int, steps:
     robot.set("command", torque=torque)
     # Follow the torque physics step by physics step.
     block: Any = robot.block
-    one = block.plant.simulating(block._drives, 1, block.push)
+    one = block.plant.simulation(block._drives, 1, block.push)
 
     def simulate() -> None:
         for _ in range(4):

@@ -17,6 +17,8 @@ from aloft.robots.description import RobotDescription
 from aloft.runtime.language.context import Clock, Context
 from aloft.runtime.testing.bench import BlockBench
 
+from ...simulator_settings import grouped
+
 Data = dict[str, Any]
 
 
@@ -25,7 +27,7 @@ def described(data: Data) -> RobotDescription:
 
 
 def bench(data: Data, **params: Any) -> BlockBench[MujocoRobot]:
-    return BlockBench(MujocoRobot, params, robot=described(data))
+    return BlockBench(MujocoRobot, grouped(params), robot=described(data))
 
 
 def truth(robot: BlockBench[MujocoRobot]) -> Any:

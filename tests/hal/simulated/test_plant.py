@@ -8,16 +8,19 @@ import numpy as np
 import pytest
 
 from aloft.hal.random_streams import Purpose
-from aloft.hal.simulated import plant
+from aloft.hal.simulated import physics_step
+from aloft.hal.simulated.drives import MotorLimits
+from aloft.hal.simulated.external_forces import PushPoints, apply_push, clear_wrenches
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
-from aloft.hal.simulated.plant import Plant, PushPoints, apply_push, clear_wrenches
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.simulated.parameters import SimulatorParameters
+from aloft.hal.simulated.plant import Plant
 from aloft.hal.simulated.state import PhysicsState, TickRecord
 from aloft.mathematics.arrays import Array, Indices
 from aloft.mathematics.compiling.foreign_call import ForeignCall
 from aloft.robots.description import RobotDescription, find_robot
 from aloft.runtime.testing.bench import BlockBench
 
+from ...simulator_settings import grouped
 from .simulated_bruce import hold
 
 ROBOT = find_robot("bruce")
@@ -29,6 +32,7 @@ class HoldingDrives:
 
     def __init__(self, plant: Plant) -> None:
         self.plant = plant
+        self.limits = MotorLimits(ROBOT, plant.record)
         self.steps: list[int] = []
 
     def hold(self, position: Array, torque: Array) -> None:
@@ -46,7 +50,7 @@ class HoldingDrives:
 
 
 def plant_of(robot: RobotDescription, **params: object) -> Plant:
-    chosen = SimulatorParameters.model_validate(params)
+    chosen = SimulatorParameters.model_validate(grouped(params))
     sizes = {**robot.dimensions, **Plant.state_dimensions(chosen, robot)}
     return Plant(robot, chosen, PERIOD, PhysicsState.allocate(sizes), TickRecord.allocate(sizes))
 
@@ -54,12 +58,12 @@ def plant_of(robot: RobotDescription, **params: object) -> Plant:
 def test_stands_with_any_drives_and_counts_its_steps() -> None:
     plant = plant_of(ROBOT, timestep=0.001)
     drives = HoldingDrives(plant)
-    step = plant.simulating(drives, 1)
+    step = plant.simulation(drives, 1)
     plant.stand(step, drives.hold)
     assert plant.physics.step == 0
     assert drives.steps[-2:] == [-2, -1]
     plant.clear_record()
-    plant.simulating(drives, 50).run()
+    plant.simulation(drives, 50).run()
     assert plant.physics.step == 50 and plant.record.steps == 50
     assert float(-plant.record.load[:, 3].sum()) / 50 == pytest.approx(
         ROBOT.total_mass * 9.81, rel=0.01
@@ -70,17 +74,17 @@ def test_stands_with_any_drives_and_counts_its_steps() -> None:
 def test_loaded_it_goes_on_bit_for_bit() -> None:
     plant = plant_of(ROBOT, seed=3, timestep=0.001, gyro_noise=0.02, joint_velocity_noise=0.05)
     drives = HoldingDrives(plant)
-    step = plant.simulating(drives, 1)
+    step = plant.simulation(drives, 1)
     plant.stand(step, drives.hold)
-    plant.simulating(drives, 10).run()
+    plant.simulation(drives, 10).run()
     plant.save()
     kept = {name: view.copy() for name, view in plant.physics}
-    plant.simulating(drives, 30).run()
+    plant.simulation(drives, 30).run()
     first = plant.data.qpos.copy(), plant.streams[Purpose.GYRO].random()
     for name, view in plant.physics:
         view[...] = kept[name]
     plant.load()
-    plant.simulating(drives, 30).run()
+    plant.simulation(drives, 30).run()
     np.testing.assert_array_equal(plant.data.qpos, first[0])
     assert plant.streams[Purpose.GYRO].random() == first[1]
 
@@ -93,7 +97,7 @@ GEARS = {"gears": {"stiffness": 500.0, "damping": 0.5, "backlash": 0.001}}
 
 def run(ticks: int = 20, **options: Any) -> tuple[BlockBench[MujocoRobot], list[bytes]]:
     """A robot with every disturbance that is pushed at two points; its ports in every tick."""
-    params = {**MujocoRobot.example_parameters(), "seed": 7, **GEARS}
+    params = grouped({**MujocoRobot.example_parameters(), "seed": 7, **GEARS})
     robot: BlockBench[MujocoRobot] = BlockBench(MujocoRobot, params, robot="bruce", **options)
     hold(robot)
     seen = []
@@ -119,7 +123,7 @@ def test_machine_code_and_python_simulate_the_same_bytes() -> None:
 def test_without_the_address_of_its_functions_python_calls_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(plant, "_addresses", lambda: (0, 0))
+    monkeypatch.setattr(physics_step, "_addresses", lambda: (0, 0))
     robot, seen = run(5)
     assert not robot.block._ticking.native
     monkeypatch.undo()

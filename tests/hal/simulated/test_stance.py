@@ -17,7 +17,7 @@ from aloft.hal.simulated.stance import (
     StartError,
     centre_on_origin,
     holding_torque,
-    place_standing,
+    set_standing_pose,
 )
 from aloft.planner.models.robot_model import StanceFinder
 from aloft.planner.task.sequence import Slope, StanceLocation, ground_axes
@@ -31,7 +31,7 @@ MODEL = build_mujoco_model(ROBOT)
 
 def placed(attitude: Any) -> Any:
     data = mujoco.MjData(MODEL)
-    place_standing(MODEL, data, FloatingBase(data), ROBOT, np.array(attitude))
+    set_standing_pose(MODEL, data, FloatingBase(data), ROBOT, np.array(attitude))
     mujoco.mj_forward(MODEL, data)
     return data
 
@@ -50,7 +50,7 @@ def test_soles_are_flat_on_the_ground_under_a_turned_torso(attitude: Any) -> Non
 def test_on_ground_that_leans_it_stands_as_the_planner_has_it(slope: Slope) -> None:
     data, axes = mujoco.MjData(MODEL), ground_axes(slope)
     x, y, z = axes[:, 2].tolist()
-    place_standing(MODEL, data, FloatingBase(data), ROBOT, np.zeros(3), normal=(x, y, z))
+    set_standing_pose(MODEL, data, FloatingBase(data), ROBOT, np.zeros(3), normal=(x, y, z))
     place = StanceLocation(0.0, 0.0, 0.0, 0.0, 0.0, slope)
     planned = StanceFinder(ROBOT).on_ground(np.array(ROBOT.standing_position), place)
     np.testing.assert_allclose(data.qpos[:3], planned.coordinates[:3], atol=1e-8)

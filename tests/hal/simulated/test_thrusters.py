@@ -14,6 +14,7 @@ from aloft.robots.description import RobotDescription
 from aloft.runtime.testing.bench import BlockBench
 from aloft.runtime.testing.conformance import check_block, conformance_cases
 
+from ...simulator_settings import grouped
 from .simulated_bruce import lift
 
 MASS, INERTIA = 2.0, 0.02
@@ -43,7 +44,7 @@ def drone(lag: float = 0.0, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) 
 
 
 def bench(robot: RobotDescription, **params: Any) -> BlockBench[MujocoRobot]:
-    return BlockBench(MujocoRobot, params, robot=robot, rate=500.0)
+    return BlockBench(MujocoRobot, grouped(params), robot=robot, rate=500.0)
 
 
 def seen(robot: BlockBench[MujocoRobot]) -> Any:
@@ -146,4 +147,4 @@ def test_ports_are_there_where_the_description_has_thrusters() -> None:
 @pytest.mark.parametrize("case", conformance_cases())
 def test_keeps_every_blocks_promises(case: str) -> None:
     noise = {"gyro_noise": 0.02, "latency": 0.002, "jitter": 0.0005, "thrust_spread": 0.05}
-    check_block(MujocoRobot, noise, robot=drone(lag=LAG), cases=[case])
+    check_block(MujocoRobot, grouped(noise), robot=drone(lag=LAG), cases=[case])

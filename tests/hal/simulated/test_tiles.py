@@ -10,8 +10,8 @@ from PIL import Image
 from pydantic import ValidationError
 
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
+from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.simulated.scenes import SceneParameters, step
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
 from aloft.hal.simulated.tiles import UnevenParameters
 from aloft.robots.description import find_robot
 from aloft.robots.kinematics import ball_feet, standing_contacts
@@ -110,5 +110,5 @@ def test_the_simulator_tells_scores_how_uneven_its_ground_is():
     context = Context.__new__(Context)
     object.__setattr__(context, "robot", BRUCE)
     for uneven, tolerance in ((None, 0.0), ({"height": "2 cm"}, 0.02)):
-        params = SimulatorParameters.model_validate({"uneven": uneven})
+        params = SimulatorParameters.model_validate({"ground": {"uneven": uneven}})
         assert MujocoRobot.exported_values(params, context)["ground_tolerance"] == tolerance

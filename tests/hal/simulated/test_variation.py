@@ -10,12 +10,13 @@ import pytest
 
 from aloft.hal.simulated.effects import SwitchEffects
 from aloft.hal.simulated.mujoco_model import build_world
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.simulated.state import PhysicsState
 from aloft.hal.simulated.switch_effects import SwitchDelays
 from aloft.hal.simulated.variation import draw_variation
 from aloft.robots.description import find_robot
 
+from ...simulator_settings import grouped
 from .simulated_bruce import bench, hold
 from .test_drive_effects import SIZES
 
@@ -25,7 +26,7 @@ WEIGHT = 5.118 * 9.81
 
 
 def world(**params: Any) -> Any:
-    chosen = SimulatorParameters.model_validate(params)
+    chosen = SimulatorParameters.model_validate(grouped(params))
     return build_world(chosen, ROBOT, draw_variation(chosen, ROBOT))
 
 
@@ -45,7 +46,8 @@ def test_links_differ_each_by_itself() -> None:
 def test_links_are_longer_in_all_directions() -> None:
     nominal, other = world(), world(seed=2, links={"length_spread": 0.02})
     variation = draw_variation(
-        SimulatorParameters.model_validate({"seed": 2, "links": {"length_spread": 0.02}}), ROBOT
+        SimulatorParameters.model_validate(grouped({"seed": 2, "links": {"length_spread": 0.02}})),
+        ROBOT,
     )
     factor = np.array([1.0, *variation.link_length])  # of the world and of the links
     assert len(set(variation.link_length)) == len(ROBOT.links)
@@ -98,9 +100,9 @@ def test_joints_and_rotors_differ() -> None:
 def test_what_has_no_spread_is_drawn_as_before() -> None:
     """An effect that is on changes no other draw."""
     usual = {"mass_spread": 0.05, "friction_range": [0.5, 1.0], "base_com_spread": 0.01, "seed": 9}
-    first = draw_variation(SimulatorParameters.model_validate(usual), ROBOT)
+    first = draw_variation(SimulatorParameters.model_validate(grouped(usual)), ROBOT)
     more = {**usual, "links": {"mass_spread": 0.1}, "imu": {"position_spread": 0.01}}
-    second = draw_variation(SimulatorParameters.model_validate(more), ROBOT)
+    second = draw_variation(SimulatorParameters.model_validate(grouped(more)), ROBOT)
     assert second.link_mass and not first.link_mass
     for name in ("friction", "mass", "base_com_offset", "contact_stiffness"):
         assert getattr(first, name) == getattr(second, name)
@@ -153,9 +155,9 @@ def test_switches_close_late_and_open_later() -> None:
     memory = PhysicsState.allocate({**SIZES, "n_late_switches": 2})
     effects = SwitchEffects.model_validate({"debounce": 0.002, "sticking": 0.003})
     switches = SwitchDelays(effects, step, memory)
-    switches.begin()
+    switches.begin(np.zeros(len(ROBOT.joints)))
     pressed = np.array([False, False])
-    call = switches.settling(pressed)
+    call = switches.settle_call(pressed)
     seen = []
     for k in range(60):
         pressed[0] = 10 <= k < 30

@@ -31,14 +31,14 @@ def windings(**params: Any) -> tuple[Windings, PhysicsState, MotorLimits]:
     memory = PhysicsState.allocate({**SIZES, "n_windings": N, "n_battery": 4})
     chosen = WindingParameters.model_validate(params)
     found = Windings(chosen, ROBOT, np.full(N, 1.02), STEP, memory)
-    found.begin()
+    found.begin(np.zeros(len(ROBOT.joints)))
     return found, memory, MotorLimits(ROBOT, TickRecord.allocate({**ROBOT.dimensions}))
 
 
 def test_a_winding_warms_as_its_closed_form_says() -> None:
     """With a resistance that stays, T = T_a + R_th P (1 - exp(-t / tau)), P = R (torque / k)^2."""
     found, memory, limits = windings(copper=0.0, ambient=20.0, temperature=20.0)
-    limiting, heating = found.limiting(limits), found.heating(limits)
+    limiting, heating = found.limit_call(limits), found.heat_call(limits)
     limits.scratch.torque[:] = 4.0
     for _ in range(20_000):
         limiting.run()
@@ -50,7 +50,7 @@ def test_a_winding_warms_as_its_closed_form_says() -> None:
 
 def test_copper_and_magnets_weaken_a_warm_motor() -> None:
     found, _, limits = windings(temperature=75.0)
-    found.limiting(limits).run()
+    found.limit_call(limits).run()
     np.testing.assert_allclose(found.warm.constant, 1.02 * (1.0 - 0.0012 * 50.0))
     supply = ROBOT.supply
     assert supply is not None
@@ -71,12 +71,12 @@ def test_a_pack_sees_the_warm_motors() -> None:
     found, memory, limits = windings(temperature=75.0)
     params = BatteryParameters.model_validate({"open_voltage": 14.8, "resistance": 0.04})
     pack = Battery(params, ROBOT, STEP, memory, found.warm)
-    pack.begin()
-    found.limiting(limits).run()
-    pack.limiting(limits).run()
+    pack.begin(np.zeros(len(ROBOT.joints)))
+    found.limit_call(limits).run()
+    pack.limit_call(limits).run()
     np.testing.assert_allclose(limits.motors.no_load, ROBOT.motors.no_load_speed / 0.94)
     limits.scratch.torque[:], limits.scratch.speed[:] = 5.0, 0.0
-    pack.feeding(limits).run()
+    pack.feed_call(limits).run()
     heat = N * 0.2 * (1.0 + 0.0039 * 50.0) * (5.0 / 0.35) ** 2 + 15.0
     assert float(pack.voltage[0]) * memory.battery[3] == pytest.approx(heat)
 
@@ -101,7 +101,7 @@ def test_a_hot_robot_reports_it_and_goes_on_from_a_snapshot() -> None:
 def test_the_drives_of_the_twin_report_their_windings() -> None:
     graph = aloft.load(
         GRAPHS / "jump_twin.yaml",
-        overrides={"robot.windings": {"temperature": 60.0}, "duration": "0.2 s"},
+        overrides={"robot.actuators.windings": {"temperature": 60.0}, "duration": "0.2 s"},
     )
     found = graph.run(log=True)
     temperature = found.signal("robot.health.temperature")
@@ -120,5 +120,7 @@ def test_windings_that_nobody_described_are_refused(
     graph: str, windings: dict[str, float], text: str
 ) -> None:
     with pytest.raises(LoadError) as caught:
-        aloft.load(GRAPHS / "robots" / f"{graph}.yaml", overrides={"robot.windings": windings})
+        aloft.load(
+            GRAPHS / "robots" / f"{graph}.yaml", overrides={"robot.actuators.windings": windings}
+        )
     assert text.replace("a `supply`", "`supply`") in str(caught.value)

@@ -15,6 +15,8 @@ from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.testing.bench import BlockBench
 
+from ...simulator_settings import grouped
+
 ROBOT = find_robot("bruce")
 START = 0.1
 NOISE = {"gyro_noise": 0.02, "accelerometer_noise": 0.1, "joint_velocity_noise": 0.05}
@@ -50,7 +52,7 @@ FAST = (("dead", 5), ("hot", 20), ("frozen_imu", 25))
 
 def bench(*faults: dict[str, Any], **params: Any) -> BlockBench[TwinRobot]:
     given = [{"start": START, **fault} for fault in faults]
-    robot = BlockBench(TwinRobot, {**NOISE, **params, "faults": given}, robot="bruce")
+    robot = BlockBench(TwinRobot, grouped({**NOISE, **params, "faults": given}), robot="bruce")
     robot.set(
         "command", mode=CommandMode.ACTIVE, torque=0.01, position=ROBOT.standing_position,
         velocity=0.0, stiffness=150.0, damping=2.0,

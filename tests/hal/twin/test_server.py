@@ -16,7 +16,7 @@ from aloft.hal.bear.configuration import Hardware
 from aloft.hal.bear.measurement import READ
 from aloft.hal.bear.protocol import FrameReader, Instruction, frame_bytes
 from aloft.hal.bear.sense_board import SenseBoard
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.twin.server import PseudoTerminal, TwinServer
 from aloft.hal.twin.twin import standing_twin
 from aloft.robots.description import find_robot

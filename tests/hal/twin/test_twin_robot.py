@@ -15,12 +15,14 @@ from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import BlockError
 from aloft.runtime.testing.bench import BlockBench
 
+from ...simulator_settings import grouped
+
 ROBOT = find_robot("bruce")
 WEIGHT = ROBOT.total_mass * 9.81
 
 
 def bench(folder: Path | None = None, **params: Any) -> BlockBench[TwinRobot]:
-    return BlockBench(TwinRobot, params, robot="bruce", folder=folder)
+    return BlockBench(TwinRobot, grouped(params), robot="bruce", folder=folder)
 
 
 def hold(robot: BlockBench[TwinRobot], stiffness: float = 150.0) -> None:

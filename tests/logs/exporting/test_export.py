@@ -29,7 +29,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[RecordedRun]:
     """A jump up to its landing, and one with another start, 20 ms later."""
     folder = tmp_path_factory.mktemp("export")
     found = []
-    for name, extra in (("a", []), ("b", ["robot.seed=3", "robot.encoder_offset=3 mrad"])):
+    for name, extra in (("a", []), ("b", ["robot.seed=3", "robot.sensors.encoder_offset=3 mrad"])):
         path = folder / f"{name}.rrd"
         graph = load(ROOT / "graphs" / "up_5cm.yaml", ["duration=1.5 s", *extra])
         graph.run(sinks=[Recorder(path)], log=False)

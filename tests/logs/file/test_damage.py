@@ -22,7 +22,7 @@ from aloft.logs.file.messages import (
 from aloft.logs.file.repair import repair
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.running.memory import BoundGraph, Snapshot
-from aloft.runtime.running.sinks import Note
+from aloft.runtime.running.sink import Note
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 BATCHES, BATCH = 6, 10

@@ -15,7 +15,7 @@ from aloft.logs.file.messages import CLOSING, Content, DamagedError
 from aloft.logs.file.repair import repair
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.running.memory import BoundGraph, Snapshot
-from aloft.runtime.running.sinks import Note
+from aloft.runtime.running.sink import Note
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 RERUN = Path(sys.executable).with_name("rerun")

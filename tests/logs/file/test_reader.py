@@ -15,7 +15,7 @@ from aloft.runtime.language.block import Block, Input, Output, State
 from aloft.runtime.language.parameter_change import ParameterChange
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.running.memory import BoundGraph, Snapshot
-from aloft.runtime.running.sinks import Note, parameter_note
+from aloft.runtime.running.sink import Note, parameter_note
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 

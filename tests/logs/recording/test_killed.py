@@ -17,7 +17,7 @@ from aloft.logs.recording.recorder import Recorder
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.loading import checked_file
 from aloft.runtime.running.executor import Executor
-from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.running.sink import Sink
 
 pytestmark = pytest.mark.long
 
@@ -36,24 +36,18 @@ def graph(folder: Path, seconds: float = TICKS / 1000) -> CheckedGraph:
     return checked_file(folder / "graph.yaml")
 
 
-class KillLater:
+class KillLater(Sink):
     """A sink that kills the recorder a random time after a random tick."""
 
     def __init__(self, recorder: Recorder, moment: random.Random) -> None:
         self.recorder, self.tick = recorder, moment.randrange(TICKS)
         self.wait = moment.uniform(0.0, 0.6)
 
-    def open(self, bound: BoundGraph) -> None:
-        """Nothing."""
-
     def record(self, tick: int) -> None:
         if tick == self.tick:
             time.sleep(self.wait)
             assert self.recorder.link is not None
             os.kill(self.recorder.link.process_id, signal.SIGKILL)
-
-    def close(self) -> None:
-        """Nothing."""
 
 
 @pytest.mark.parametrize("number", range(4))

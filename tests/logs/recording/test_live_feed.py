@@ -14,7 +14,7 @@ from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.running.executor import run
-from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.running.sink import Sink
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 
@@ -31,21 +31,15 @@ class Count(Block):
         self.numbers.value.fill(self.tick)
 
 
-class Strike:
+class Strike(Sink):
     """A sink that sends the viewer a signal at a tick."""
 
     def __init__(self, tick: int, process: int, number: signal.Signals) -> None:
         self._at, self._process, self._number = tick, process, number
 
-    def open(self, bound: BoundGraph) -> None:
-        pass
-
     def record(self, tick: int) -> None:
         if tick == self._at:
             os.kill(self._process, self._number)
-
-    def close(self) -> None:
-        pass
 
 
 @pytest.mark.long

@@ -24,6 +24,7 @@ from aloft.runtime.language.stages import CheckedGraph, ClockSpec
 from aloft.runtime.running.executor import run
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.run_result import RunResult
+from aloft.runtime.running.sink import Sink
 from aloft.runtime.testing.allocations import count_array_allocations
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
@@ -52,21 +53,15 @@ class Walk(Block):
         self.memory.count[...] = self.y.count
 
 
-class At:
+class At(Sink):
     """A sink that does something in one tick."""
 
     def __init__(self, tick: int, action: Callable[[], object]) -> None:
         self.tick, self.action = tick, action
 
-    def open(self, bound: BoundGraph) -> None:
-        """Nothing."""
-
     def record(self, tick: int) -> None:
         if tick == self.tick:
             self.action()
-
-    def close(self) -> None:
-        """Nothing."""
 
 
 def graph(ticks: int) -> CheckedGraph:

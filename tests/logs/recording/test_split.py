@@ -14,8 +14,8 @@ from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
 from aloft.runtime.loading import checked_file
 from aloft.runtime.running.executor import Executor
-from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.run_result import RunResult
+from aloft.runtime.running.sink import Sink
 
 GRAPH = """
 rate: 100 Hz
@@ -31,10 +31,7 @@ def recorded(folder: Path, split: float, on_tick: int = -1) -> tuple[Recorder, R
     (folder / "graph.yaml").write_text(GRAPH)
     recorder = Recorder(folder / "run.rrd", split=split, flush_period=0.01)
 
-    class Kill:
-        def open(self, bound: BoundGraph) -> None:
-            """Nothing."""
-
+    class Kill(Sink):
         def record(self, tick: int) -> None:
             if tick == on_tick:
                 assert recorder.link is not None
@@ -42,9 +39,6 @@ def recorded(folder: Path, split: float, on_tick: int = -1) -> tuple[Recorder, R
                 while not (folder / "run-part002.part.rrd").exists() and time.monotonic() < end:
                     time.sleep(0.01)
                 os.kill(recorder.link.process_id, signal.SIGKILL)
-
-        def close(self) -> None:
-            """Nothing."""
 
     result = Executor(checked_file(folder / "graph.yaml"), sinks=[recorder, Kill()], log=True).run()
     return recorder, result

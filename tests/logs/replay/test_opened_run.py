@@ -21,7 +21,7 @@ from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.run_result import RunResult
-from aloft.runtime.running.sinks import parameter_note
+from aloft.runtime.running.sink import Sink, parameter_note
 
 GRAPH = """
 rate: 200 Hz
@@ -49,7 +49,7 @@ class Fragile(arithmetic.Gain):
 """
 
 
-class Tune:
+class Tune(Sink):
     """A sink that changes the gain twice, once in the tick of a keyframe."""
 
     def open(self, bound: BoundGraph) -> None:
@@ -59,9 +59,6 @@ class Tune:
         if tick in (139, 199):
             value = 0.1 if tick == 139 else 1 / 3
             self.bound.parameters.requests.append(adjust(self.bound.blocks, {"gain.gain": value}))
-
-    def close(self) -> None:
-        pass
 
 
 def record(folder: Path, **settings: Any) -> RunResult:

@@ -17,6 +17,7 @@ from aloft.runtime.loading import checked_file, checked_text
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.running.sink import Sink
 from aloft.runtime.testing import StretchError
 
 GRAPH = """
@@ -50,7 +51,7 @@ class Adder(Block):
 """
 
 
-class ChangeShare:
+class ChangeShare(Sink):
     """A sink that changes a parameter at tick 160."""
 
     def open(self, bound: BoundGraph) -> None:
@@ -59,9 +60,6 @@ class ChangeShare:
     def record(self, tick: int) -> None:
         if tick == 159:
             self.bound.parameters.requests.append(adjust(self.bound.blocks, ["total.share=0.25"]))
-
-    def close(self) -> None:
-        pass
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from aloft.logs.viewing.plot_views import limits_of
 from aloft.logs.viewing.scene_ports import OTHERS, PUSH, ROLES, PoseSource, port_of, scene_ports
 from aloft.logs.viewing.state_lanes import lanes_of, times_table
 from aloft.robots.description import find_robot
-from aloft.runtime.language.terrain import Ground, Terrain
+from aloft.robots.terrain import Ground, Terrain
 from aloft.runtime.running.memory import BoundGraph
 
 GRAPH = Path(__file__).parents[3] / "graphs" / "jump.yaml"
@@ -75,6 +75,7 @@ def test_all_of_the_jump_is_found() -> None:
 
 def test_every_role_is_a_signal_of_the_vocabulary() -> None:
     from aloft.blocks import signals
+    from aloft.extensions.hopping import signals as hopping
     from aloft.runtime.language.signals import Signal
 
     for role in ROLES:
@@ -82,6 +83,13 @@ def test_every_role_is_a_signal_of_the_vocabulary() -> None:
         assert {name.partition(":")[0] for name in role.fields} <= set(fields)
         assert not set(role.lacks) & set(fields)
     types = {n for n in signals.__all__ if issubclass(getattr(signals, n), Signal)}
+    types |= {
+        n
+        for n, kind in vars(hopping).items()
+        if isinstance(kind, type)
+        and kind.__module__ == hopping.__name__
+        and issubclass(kind, Signal)
+    } - {"PlanRows"}
     assert types == {role.signal for role in ROLES} | set(OTHERS)
 
 

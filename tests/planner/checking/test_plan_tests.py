@@ -88,12 +88,12 @@ def test_another_task_is_missed_by_the_difference(by_hand: PlannedJump, evidence
     flight_time = by_hand.touchdown_time - by_hand.lift_off_time
     tests = found(asked(by_hand, rise=0.09, distance_x=0.03, twist=0.6, flight_time=0.3))
     assert tests["rise"].value == pytest.approx(0.005, abs=1e-5)
-    assert tests["landing_place"].value == pytest.approx(0.03, abs=1e-4)
-    assert tests["landing_place"].where == "x"
+    assert tests["landing_position"].value == pytest.approx(0.03, abs=1e-4)
+    assert tests["landing_position"].where == "x"
     assert tests["twist"].value == pytest.approx(0.6, abs=1e-3)
     assert tests["whole_turn"].value == pytest.approx(0.6, abs=1e-3)
     assert tests["flight_time"].value == pytest.approx(abs(flight_time - 0.3), abs=1e-6)
-    assert found(asked(by_hand, distance_y=-0.05))["landing_place"].where == "y"
+    assert found(asked(by_hand, distance_y=-0.05))["landing_position"].where == "y"
     turned = found(asked(by_hand, rotation=6.28))
     assert turned["rotation"].value == pytest.approx(6.28, abs=0.05) and "whole_turn" not in turned
     for speed in (1.0, 1.8):
@@ -499,8 +499,8 @@ def test_the_jump_that_misses_its_task_is_named(
     # all stances behind that flight are moved aside
     for axis, name in ((0, "x"), (1, "y")):
         tests = found(shifted(plan, "position", amount, (slice(touchdown, None), axis)))
-        assert tests["landing_place"].value == pytest.approx(abs(amount), abs=1e-3)
-        assert tests["landing_place"].where in {f"{name} jump {k + 1}" for k in range(jump, 2)}
+        assert tests["landing_position"].value == pytest.approx(abs(amount), abs=1e-3)
+        assert tests["landing_position"].where in {f"{name} jump {k + 1}" for k in range(jump, 2)}
     moved = found(shifted(plan, "position", 0.3, (touchdown + 1, 9)))
     assert moved["impact"].where == f" jump {jump + 1}"
 

@@ -98,7 +98,7 @@ def test_without_a_plan_nothing_is_kept(library: PlanLibrary) -> None:
 def test_task_seed_trial_and_score_are_no_part_of_the_controller() -> None:
     own = controller()
     for setting in (
-        "plan.task.rise=9cm", "robot.seed=4", "robot.mass_spread=0.05", "robot.latency=5ms",
+        "plan.task.rise=9cm", "robot.seed=4", "robot.body.mass_spread=0.05", "robot.latency=5ms",
         "plan.rehearsed=false", "plan.library=there", "score.foot_slip=20mm", "push.force=3",
     ):  # fmt: skip
         assert controller(setting) == own, setting

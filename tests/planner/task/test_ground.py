@@ -10,7 +10,7 @@ from aloft.planner.task.ground import scene_of
 from aloft.planner.task.sequence import ground_axes
 from aloft.planner.task.task import JumpTaskError, make_task
 from aloft.robots.description import find_robot
-from aloft.runtime.language.terrain import Terrain
+from aloft.robots.terrain import Terrain
 
 BRUCE = find_robot("bruce")
 
@@ -157,4 +157,4 @@ def test_ground_that_cannot_be_built_is_refused(values: dict[str, Any], words: s
         scene(**values)
     assert "landing_height: " in str(caught.value)
     assert words in str(caught.value)
-    assert "robot.scene" in str(caught.value)
+    assert "robot.ground.scene" in str(caught.value)

@@ -52,9 +52,9 @@ def test_a_file_that_says_nothing_more_is_told_of_nothing(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("said", [
-    "friction coefficient 0.8 (foot); friction is the ground's, robot.friction",
+    "friction coefficient 0.8 (foot); friction is the ground's, robot.ground.friction",
     "torsional and rolling friction 0.02 0.01 (foot) and condim 6 (foot)",
-    "solref 0.01 1 (foot); robot.soles",
+    "solref 0.01 1 (foot); robot.ground.soles",
     "springs of joints, stiffness 7 (knee)",
     "gains of servos, kp 400, kv 12 (knee)",
     "activation dynamics of the actuators on knee",
@@ -87,15 +87,15 @@ def test_a_joint_that_an_equality_ties_is_fixed(tmp_path: Path) -> None:
     text = ONE_LEG.replace("<actuator>", tie)
     found = read_text(tmp_path, text)
     assert [joint.name for joint in found.description.joints] == ["hip"]
-    assert "joint knee follows hip in the file and is fixed here" in found.notes
+    assert "joint knee follows hip in the file and is fixed at 0.749066 here" in found.notes
     inactive = read_text(tmp_path, text.replace("<joint joint1", '<joint active="false" joint1'))
     assert len(inactive.description.joints) == 2
     assert math.isfinite(found.description.total_mass)
 
 
 @pytest.mark.parametrize("said", [
-    "left out: friction coefficient 1.5 (leg); mu1 0.8, mu2 0.6 (trunk); friction is the ground's, robot.friction",
-    "left out: softness of contacts, kp 1e+06 (trunk); robot.soles",
+    "left out: friction coefficient 1.5 (leg); mu1 0.8, mu2 0.6 (trunk); friction is the ground's, robot.ground.friction",
+    "left out: softness of contacts, kp 1e+06 (trunk); robot.ground.soles",
     "left out: restitution 0.5 (leg)",
     "left out: springs of joints, springStiffness 7 (hip)",
     "left out: soft limits -0.5 to 1 (hip); those of <limit> hold",

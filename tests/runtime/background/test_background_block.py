@@ -17,6 +17,7 @@ from aloft.runtime.placement.placed import spread
 from aloft.runtime.running.executor import run
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.run_result import RunResult
+from aloft.runtime.running.sink import Sink
 from aloft.runtime.running.stepping import SteppedRun
 from aloft.runtime.testing.allocations import count_array_allocations
 from aloft.runtime.testing.spread import run_spread
@@ -81,7 +82,7 @@ def test_a_reason_to_stop_appears_with_its_outputs() -> None:
     assert (result.success, result.reason, result.ticks) == (True, "counted enough", 25)
 
 
-class ChangeAt:
+class ChangeAt(Sink):
     """A sink that changes parameters after some ticks."""
 
     def __init__(self, **changes: tuple[int, float]) -> None:
@@ -95,9 +96,6 @@ class ChangeAt:
             if tick == after:
                 adjustment = adjust(self.bound.blocks, {f"block.{name}": value})
                 self.bound.parameters.requests.append(adjustment)
-
-    def close(self) -> None:
-        """No-op."""
 
 
 @pytest.mark.parametrize(("use", "name"), [("Slow", "gain"), ("Filter", "share")])

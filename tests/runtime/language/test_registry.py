@@ -141,7 +141,7 @@ def test_a_file_beside_the_graph_hides_no_package_from_others(tmp_path: Path) ->
         (
             "from aloft.runtime.language.block import Block, Output\nclass Mine(Block):\n    y = Output(int)",
             "DeclarationError: a port carries a Signal type, not <class 'int'>",
-            "block.py:",
+            "ports.py:",
         ),
         (
             "import abc\nfrom aloft.runtime.language.block import Block\nclass Mine(Block, abc.ABC):\n"

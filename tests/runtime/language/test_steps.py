@@ -14,8 +14,8 @@ from aloft.runtime.language.parameter_change import Adjustment
 from aloft.runtime.language.parameters import Parameters, live_parameter, parameter
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.language.steps import call_of
-from aloft.runtime.running.chain import can_be_chained
 from aloft.runtime.running.live_parameters import LiveParameters
+from aloft.runtime.running.tick_calls import can_be_chained
 from aloft.runtime.testing.bench import BlockBench
 
 

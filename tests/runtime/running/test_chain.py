@@ -21,10 +21,10 @@ from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running import timing
-from aloft.runtime.running.chain import Chain
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.pacing import WallTime
+from aloft.runtime.running.sink import Sink
 from aloft.runtime.running.ticker import Ticker
 from aloft.runtime.testing import BlockUse, checked_graph
 
@@ -130,7 +130,11 @@ def ticker(fuse: bool, **params: object) -> Ticker:
 
 
 def chains(made: Ticker) -> list[tuple[str, ...]]:
-    return [chain.owners for program in made.programs for chain in program.chains]
+    return [
+        tuple(owner.name for owner in chain.owners)
+        for program in made.programs
+        for chain in program.chains
+    ]
 
 
 def test_consecutive_blocks_of_a_phase_are_one_call_with_the_same_bytes() -> None:
@@ -248,7 +252,7 @@ def test_after_attention_the_rest_of_the_chain_runs_once() -> None:
 
 @pytest.mark.parametrize("fuse", [True, False])
 def test_a_chain_takes_over_calls_that_new_parameters_have_made(fuse: bool) -> None:
-    class Change:
+    class Change(Sink):
         """A sink that changes the gain after tick 9."""
 
         def open(self, bound: BoundGraph) -> None:
@@ -258,9 +262,6 @@ def test_a_chain_takes_over_calls_that_new_parameters_have_made(fuse: bool) -> N
             if tick == 9:
                 blocks = self.bound.parameters.blocks
                 self.bound.parameters.requests.append(adjust(blocks, ["two.gain=0.75"]))
-
-        def close(self) -> None:
-            pass
 
     hashes = {
         plain: Executor(graph(), plain=plain, fuse=fuse, sinks=[Change()]).run(30).run_hash
@@ -341,13 +342,12 @@ def test_the_step_is_shown_in_the_file_of_the_class() -> None:
 
 
 def test_a_call_that_is_not_compiled_is_not_taken_over() -> None:
-    bound = ticker(fuse=False).bound
-    chain = Chain([bound.blocks["one"]], [1], bound.running)
-    one = bound.blocks["one"]
+    made = ticker(fuse=True)
+    one = made.bound.blocks["one"]
     assert isinstance(one, Smooth)
     one.kernel_calls[1].use_plain()
     with pytest.raises(RunError, match="block 'one' has a kernel that did not compile"):
-        chain.refresh()
+        made.refresh_chains()
 
 
 def test_without_a_clock_for_machine_code_timed_blocks_are_not_fused(

@@ -11,6 +11,7 @@ from aloft.runtime.language.errors import AloftError, BlockError, ExitCode, RunE
 from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.running.executor import Executor, run
 from aloft.runtime.running.life_cycle import STOP_CYCLES, LifeCycle, LifeState
+from aloft.runtime.running.sink import Sink
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 CALLS: list[str] = []
@@ -167,10 +168,8 @@ def test_the_tick_that_is_not_finite_is_recorded() -> None:
 
 
 def test_a_failing_sink_ends_the_run_and_is_closed() -> None:
-    class FullDisk:
+    class FullDisk(Sink):
         closed = False
-
-        def open(self, bound: object) -> None: ...
 
         def record(self, tick: int) -> None:
             if tick == 2:

@@ -16,6 +16,7 @@ from aloft.runtime.loading.checking.parameters import adjust
 from aloft.runtime.running.executor import Executor
 from aloft.runtime.running.live_parameters import LiveParameters
 from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.running.sink import Sink
 from aloft.runtime.testing import BlockUse, checked_graph
 
 
@@ -50,7 +51,7 @@ def bound() -> BoundGraph:
     )
 
 
-class ChangeAt:
+class ChangeAt(Sink):
     """A sink that changes parameters after a tick, as somebody at the keyboard would."""
 
     def __init__(self, tick: int, *settings: str) -> None:
@@ -62,9 +63,6 @@ class ChangeAt:
     def record(self, tick: int) -> None:
         if tick == self.tick:
             self.parameters.requests.append(adjust(self.parameters.blocks, self.settings))
-
-    def close(self) -> None:
-        pass
 
 
 def test_a_change_counts_from_the_next_tick_on_and_is_kept() -> None:

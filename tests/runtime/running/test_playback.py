@@ -17,6 +17,7 @@ from aloft.runtime.running.playback import (
     playback_block_type,
     playback_graph,
 )
+from aloft.runtime.running.sink import Sink
 from aloft.runtime.testing import BlockUse, checked_graph
 
 
@@ -59,7 +60,7 @@ def test_what_is_fed_is_computed_with() -> None:
     )
     feed = Playback(bound, layout)  # a recording with another layout
 
-    class Show:
+    class Show(Sink):
         def open(self, bound: BoundGraph) -> None:
             self.record(-1)
 
@@ -69,9 +70,6 @@ def test_what_is_fed_is_computed_with() -> None:
             first, last = layout.byte_range("robot.y.value")
             row[first:last] = np.array([tick + 1.0]).view(np.uint8)
             feed.show(row)
-
-        def close(self) -> None:
-            pass
 
     result = Executor(bound, sinks=[Show()]).run(6)
     result.raise_if_failed()

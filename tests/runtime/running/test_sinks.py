@@ -8,6 +8,7 @@ import pytest
 from aloft.blocks.general.sources import SineWave
 from aloft.runtime.running.executor import Executor, run
 from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.running.sink import Sink
 from aloft.runtime.running.sinks import MemoryLog, RunHash
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
@@ -53,7 +54,7 @@ def test_a_log_opened_again_forgets(bound: BoundGraph) -> None:
 def test_further_sinks_get_every_tick(bound: BoundGraph) -> None:
     seen: list[object] = []
 
-    class Witness:
+    class Witness(Sink):
         def open(self, graph: BoundGraph) -> None:
             seen.append(graph is bound)
 

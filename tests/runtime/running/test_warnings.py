@@ -5,7 +5,7 @@ from __future__ import annotations
 from aloft.blocks.general.vectors import Vector
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.running.executor import run
-from aloft.runtime.running.sinks import Note
+from aloft.runtime.running.sink import Note, Sink
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 
@@ -24,20 +24,14 @@ class Waiver(Block):
         return ["the check was waived"]
 
 
-class Listener:
+class Listener(Sink):
     """Keeps the notes."""
 
     def __init__(self) -> None:
         self.notes: list[Note] = []
 
-    def open(self, bound: object) -> None: ...
-
-    def record(self, tick: int) -> None: ...
-
     def note(self, note: Note) -> None:
         self.notes.append(note)
-
-    def close(self) -> None: ...
 
 
 def test_a_warning_is_in_the_result_and_told_to_the_sinks() -> None:

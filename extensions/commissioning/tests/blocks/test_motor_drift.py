@@ -16,7 +16,10 @@ from aloft.studies.expansion import load_cell
 
 ROBOT = find_robot("bruce")
 N = len(ROBOT.joints)
-WARM = {"robot.windings": {"temperature": 65.0}, "robot.battery": {"open_voltage": 14.4}}
+WARM = {
+    "robot.actuators.windings": {"temperature": 65.0},
+    "robot.actuators.battery": {"open_voltage": 14.4},
+}
 
 
 def drift(**params: float) -> BlockBench[Any]:

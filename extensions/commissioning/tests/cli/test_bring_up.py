@@ -19,7 +19,7 @@ from aloft.extensions.commissioning.bring_up.session import Request
 from aloft.extensions.commissioning.bring_up.steps import BringUpStep
 from aloft.extensions.commissioning.cli import bring_up as verb
 from aloft.hal.bear.configuration import Hardware
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.simulated.parameters import SimulatorParameters, StartParameters
 from aloft.hal.twin.server import PseudoTerminal, TwinServer
 from aloft.hal.twin.wiring import Wiring
 from aloft.robots.description import find_robot
@@ -165,7 +165,7 @@ def test_a_person_walks_stops_and_goes_on(
 @contextmanager
 def served(folder: Path, *, held: bool, gantry: dict[str, Any]) -> Iterator[Path]:
     """A twin under power as `aloft twin --virtual --write` serves it; gives the file that it writes."""
-    params = SimulatorParameters(seed=2, gantry=gantry)
+    params = SimulatorParameters(seed=2, start=StartParameters(gantry=gantry))
     twin = Wiring.of(ROBOT).twin(ROBOT, params, held=held)
     with TwinServer(twin, virtual=True, period=0.001) as server:
         file = folder / "twin.yaml"

@@ -11,7 +11,7 @@ import yaml
 from tests.cli.conftest import run_here
 
 from aloft.hal.bear.configuration import Hardware
-from aloft.hal.simulated.simulated_robot import SimulatorParameters
+from aloft.hal.simulated.parameters import SimulatorParameters
 from aloft.hal.twin.server import TwinServer
 from aloft.hal.twin.twin import standing_twin
 from aloft.robots.description import find_robot

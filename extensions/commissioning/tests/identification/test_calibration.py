@@ -60,7 +60,7 @@ def found_and_true(seed: int) -> tuple[Calibration, dict[str, object]]:
     graph = aloft.load(GRAPH).with_seed(seed)
     found = calibration_from(swayed(graph))
     params = next(block.params for block in graph.checked.blocks if block.path == "robot")
-    drawn, pack = draw_variation(params, ROBOT), params.battery.of(ROBOT)
+    drawn, pack = draw_variation(params, ROBOT), params.actuators.battery.of(ROBOT)
     factors = [drawn.joint_friction * each for each in drawn.friction_of_joint]
     return found, {
         "place": drawn.imu.place, "angle": drawn.imu.to_axes,
@@ -101,7 +101,7 @@ def test_gears_that_yield_are_told() -> None:
     """Rotor and joint are two bodies, and the encoder is on the rotor, behind play."""
     graph = aloft.load(GRAPH, [
         "robot.seed=97822", "duration=12 s", "plan.sway_time=10 s", "robot.timestep=0.25 ms",
-        "robot.gears={stiffness: 1000 N m/rad, damping: 0.3 N m s/rad}",
+        "robot.actuators.gears={stiffness: 1000 N m/rad, damping: 0.3 N m s/rad}",
     ])  # fmt: skip
     compliance = identify_sensors(ROBOT, swayed(graph).motion).gear_compliance
     assert compliance.value == pytest.approx(1e-3, abs=2.0 * compliance.std)
@@ -254,14 +254,14 @@ def test_ripple_is_found_by_how_often_it_comes_again() -> None:
 def test_readings_of_slow_motions_are_as_old_as_the_simulator_makes_them() -> None:
     params = next(b.params for b in aloft.load(GRAPH).checked.blocks if b.path == "robot")
     step = params.timestep
-    exact = params.model_copy(update={
-        "imu": params.imu.model_copy(update={"bandwidth": None, "gyro_delay": 0.0, "accelerometer_delay": 0.0}),
-        "encoders": params.encoders.model_copy(update={"delay": 0.0, "velocity_filter": 0.0}),
+    sensors = params.sensors.model_copy(update={
+        "imu": params.sensors.imu.model_copy(update={"bandwidth": None, "gyro_delay": 0.0, "accelerometer_delay": 0.0}),
+        "encoders": params.sensors.encoders.model_copy(update={"delay": 0.0, "velocity_filter": 0.0}),
     })  # fmt: skip
+    exact = params.model_copy(update={"sensors": sensors})
     rate, _, position, velocity = reading_ages(exact)
     assert (rate, position, velocity) == (0.5 * step, 0.0, 0.5 * step)
-    filtered = exact.model_copy(update={
-        "encoders": exact.encoders.model_copy(update={"velocity_filter": 2e-3}),
-    })  # fmt: skip
+    late = sensors.encoders.model_copy(update={"velocity_filter": 2e-3})
+    filtered = params.model_copy(update={"sensors": sensors.model_copy(update={"encoders": late})})
     # a filter of the first order, sampled, is late by its time constant less about half a step
     assert reading_ages(filtered).velocity == pytest.approx(2e-3, abs=0.05 * step)

@@ -20,7 +20,7 @@ SHORT = ["duration=11.5 s", "plan.sway_time=10 s"]
 def test_a_late_gyroscope_and_friction_of_a_quadruped_are_found() -> None:
     """Each within twice the error that is stated; of a robot without them neither is."""
     robot, found = find_robot("go2"), []
-    for effects in ([], ["robot.imu.gyro_delay=2 ms", "robot.joint_friction=2"]):
+    for effects in ([], ["robot.sensors.imu.gyro_delay=2 ms", "robot.actuators.joint_friction=2"]):
         graph = aloft.load(GRAPHS / "robots/sway.yaml", ["robot=go2", *SHORT, *effects])
         found.append(calibration_from(swayed(graph)))
     for calibration, delay, factor in zip(found, (0.0, 0.002), (1.0, 2.0), strict=True):

@@ -211,7 +211,7 @@ include: [trials/standard.yaml]
 blocks:
   robot:
     use: hal.MujocoRobot
-    with: {scene: flat, seed: 0, bus_period: 1 ms}
+    with: {ground: {scene: flat}, seed: 0, actuators: {bus_period: 1 ms}}
     in: {command: controller.safety_command, push: push.push}
   push: {use: hal.Push, with: {force: 0 N}, in: {truth: robot.truth}}
   controller:

@@ -57,7 +57,7 @@ def test_the_robot_stands_on_the_ground_that_they_make() -> None:
     ).checked
     blocks = {block.path: block for block in checked.blocks}
     assert blocks["score"].params.jumps == 3
-    scene = blocks["robot"].params.scene
+    scene = blocks["robot"].params.ground.scene
     assert scene.floor == pytest.approx(-0.1)
     assert [(box.x, box.top) for box in scene.boxes][1:] == [
         ((0.19, 0.31), 0.04), ((0.44, 0.56), 0.02), ((0.64, 0.76), 0.0),

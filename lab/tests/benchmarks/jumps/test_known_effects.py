@@ -53,7 +53,7 @@ def test_the_robot_that_sways_has_the_effect_and_the_one_that_jumps_is_told(
     monkeypatch.setattr(known_effects, "load_cell", loaded)
     found = landed(EffectJob(3, "gyroscope 2 ms late"))
     assert found == {"in place 12 cm": "it did not run", "ahead 20 cm": "it did not run"}
-    assert asked == [({"robot.imu.gyro_delay": "2 ms"}, 3)]
+    assert asked == [({"robot.sensors.imu.gyro_delay": "2 ms"}, 3)]
     for graph in told:
         robot = graph.block("robot").params
         assert (robot.imu.gyro_delay, robot.seed) == (0.002, 3)

@@ -1,1 +1,0 @@
-"""Demo of the extension `export`."""

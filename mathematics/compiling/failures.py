@@ -1,0 +1,37 @@
+"""Failures of compiled code, which end a run."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+
+class Failure(IntEnum):
+    """Why compiled code ends a run."""
+
+    DIVISION = 0
+    TOO_LARGE = 1
+    DOMAIN = 2
+    RANGE = 3
+    NUMBA = 4
+
+
+FAILURES: dict[Failure, tuple[type[Exception], str]] = {
+    Failure.DIVISION: (ZeroDivisionError, "divided by zero"),
+    Failure.TOO_LARGE: (OverflowError, "got a whole number that does not fit into 64 bits"),
+    Failure.DOMAIN: (ValueError, "called a function outside of its domain"),
+    Failure.RANGE: (OverflowError, "got a number beyond the largest float"),
+    Failure.NUMBA: (RuntimeError, "called a numba function that raised an error"),
+}
+"""The error that Python would raise, and what is said of the kernel."""
+
+
+class Site(NamedTuple):
+    """Where a function can fail, and why."""
+
+    failure: Failure
+    line: int
+
+
+MOST_SITES = 255
+"""Sites of a function that are told apart."""

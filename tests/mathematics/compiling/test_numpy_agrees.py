@@ -1,0 +1,221 @@
+"""Statements of kernels beside the same statements by NumPy: slices, aliasing, products, whole numbers."""
+
+from __future__ import annotations
+
+import math
+import types
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aloft.mathematics.arrays import Array1D, Array2D, Indices1D, Matrix3, Vector3
+from aloft.mathematics.compiling.compile_calls import compile_calls
+from aloft.mathematics.compiling.equations import EquationError
+from aloft.mathematics.compiling.kernel_call import KernelCall
+from aloft.mathematics.compiling.kernel_registry import written_code
+from aloft.mathematics.kernel import expand, kernel
+
+LAST = 2
+
+
+def untouched(function: Any) -> Any:
+    """The function as it is written, without loops in place of equations."""
+    return types.FunctionType(written_code(function), function.__globals__)
+
+
+def three(function: Any, *arguments: Any) -> None:
+    """NumPy, plain Python and machine code give the same."""
+
+    def copies() -> list[Any]:
+        return [a.copy() if isinstance(a, np.ndarray) else a for a in arguments]
+
+    expected, plain, compiled = copies(), copies(), copies()
+    untouched(function)(*expected)
+    function(*plain)
+    call = KernelCall(function, *compiled)
+    assert compile_calls([call]) == ""
+    call.run()
+    for one, two, three in zip(expected, plain, compiled, strict=True):
+        np.testing.assert_allclose(two, one, rtol=1e-14, atol=1e-14)
+        assert np.asarray(two).tobytes() == np.asarray(three).tobytes()
+
+
+@kernel
+def steps(a: Vector3, b: Array1D, y: Array1D) -> None:
+    """Slices with steps and bounds of all kinds, of known and of unknown lengths."""
+    y[0:3] = a[::-1]
+    y[1::2] += b[-1::-2] - b[::2]
+    y[4:] += b[3::-3] - b[::4]
+    y[-3:-1] = b[:-4] + a[-2:]
+    y[::-3] = 5.0
+    y[:LAST] *= b[LAST : LAST + 2]
+    y[:0] = 7.0
+
+
+@kernel
+def moving(b: Array1D, k: int, y: Array1D) -> None:
+    """Bounds that are only known as it runs, negative ones, too."""
+    y[k:] = b[k:]
+    y[: k + 1] -= b[: k + 1]
+    y[k - 1 :: -1] += 1.0
+    for i in range(2):
+        y[i : i + 2] = b[i : i + 2] * 2.0
+
+
+@kernel
+def columns(A: Array2D, y: Array1D, B: Matrix3) -> None:
+    """Slices in two dimensions, and of a transpose."""
+    y[:] = A[::-1, 0] - A.T[1, ::-1]
+    B[::2, 1:] = A[::-2, :-1]
+    B[0][:] = A[-1][:]
+
+
+@kernel
+def own_elements(v: Array1D, A: Array2D) -> None:
+    """Elements of the target, and rows of it, are read before any is written."""
+    v[:] = v / v[0] + (v @ v) ** 0.5
+    A[0, :] = A[1] + A[0]
+
+
+@kernel
+def views(a: Array1D, y: Array1D) -> None:
+    """A part with a step handed on."""
+    back = a[::-2]
+    for i in range(back.shape[0]):
+        y[i] = back[i]
+    doubled(a[3:0:-1], y[1:4])
+
+
+@kernel
+def doubled(a: Array1D, y: Array1D) -> None:
+    y[:] = 2.0 * a
+
+
+@kernel
+def whole(n: Indices1D, y: Array1D) -> None:
+    """Division and rest of negative numbers, shifts, powers, and bits."""
+    y[0] = n[0] // n[1] + n[0] % n[1] + n[2] // -3 - n[2] % -3
+    y[1] = (n[1] << 3) + (n[0] >> 1) + n[1] ** 3 + (~n[0] & 255)
+    y[2] = n[0] / n[1] + round(2.5) + math.floor(-1.5) + int(-1.5)
+
+
+def test_statements_are_numpys() -> None:
+    random = np.random.default_rng(0)
+    a, b, A = random.normal(size=3), random.normal(size=6), random.normal(size=(3, 3))
+    three(steps, a, b, np.arange(6.0))
+    for k in (1, 2, 3):
+        three(moving, b, k, np.arange(6.0))
+    three(moving, b, -2, np.arange(6.0))
+    three(columns, A, np.zeros(3), np.ones((3, 3)))
+    three(own_elements, a, A)
+    three(views, b, np.zeros(6))
+    three(whole, np.array([-7, 2, 8]), np.zeros(3))
+
+
+@kernel
+def grows(n: Indices1D) -> None:
+    n[0] = n[0] * n[1] + n[2]
+
+
+@kernel
+def divided(n: Indices1D) -> None:
+    n[0] = n[0] // n[1]
+
+
+@kernel
+def shifted(n: Indices1D) -> None:
+    n[0] = n[0] << n[1]
+
+
+@kernel
+def rounded(x: Array1D) -> None:
+    x[0] = int(x[1])
+
+
+@kernel
+def root(x: Array1D) -> None:
+    x[0] = math.sqrt(x[1])
+
+
+@kernel
+def power(x: Array1D) -> None:
+    x[0] = x[1] ** x[2]
+
+
+@pytest.mark.parametrize(
+    ("function", "values", "error", "text"),
+    [
+        (grows, [2**40, 2**40, 0], OverflowError, "does not fit into 64 bits"),
+        (grows, [2**62, 1, 2**62], OverflowError, "does not fit into 64 bits"),
+        (divided, [-(2**63), -1, 0], OverflowError, "does not fit into 64 bits"),
+        (shifted, [1, 64, 0], OverflowError, "does not fit into 64 bits"),
+        (shifted, [1, -1, 0], ValueError, "outside of its domain"),
+        (rounded, [0.0, 1e30], OverflowError, "does not fit into 64 bits"),
+        (root, [0.0, -1.0], ValueError, "outside of its domain"),
+        (power, [0.0, -8.0, 1 / 3], ValueError, "outside of its domain"),
+        (power, [0.0, 1e300, 2.5], OverflowError, "beyond the largest float"),
+    ],
+)
+def test_numbers_out_of_range_end_the_run_and_never_wrap(
+    function: Any, values: list[float], error: type[Exception], text: str
+) -> None:
+    call = KernelCall(function, np.array(values))
+    assert compile_calls([call]) == ""
+    with pytest.raises(error, match=text):
+        call.run()
+    assert call.arguments[0].tolist() == values
+
+
+def test_whole_numbers_at_the_limit_are_exact() -> None:
+    for function, values, found in (
+        (grows, [2**31, 2**31, -1], 2**62 - 1),
+        (grows, [2**62, -2, 0], -(2**63)),
+        (divided, [-(2**63), 1, 0], -(2**63)),
+        (shifted, [-1, 63, 0], -(2**63)),
+    ):
+        call = KernelCall(function, np.array(values))
+        assert compile_calls([call]) == ""
+        call.run()
+        assert call.arguments[0][0] == found
+
+
+@kernel
+def beyond(a: Vector3, y: Vector3) -> None:
+    y[:] = a * a[3]
+
+
+@kernel
+def below(a: Vector3) -> None:
+    a[-4] = 1.0
+
+
+@kernel
+def unequal(a: Vector3, A: Matrix3, b: Array1D, y: Vector3) -> None:
+    y[:] = a + A[0, :2]
+
+
+@kernel
+def turned(A: Matrix3) -> None:
+    A[:] = A.T
+
+
+@kernel
+def changing_step(a: Array1D, k: int) -> None:
+    a[::k] = 0.0
+
+
+@pytest.mark.parametrize(
+    ("function", "text"),
+    [
+        (beyond, "a[3] is beyond a: the indices of its 3 elements are -3 to 2"),
+        (below, "a[-4] is beyond a: the indices of its 3 elements are -3 to 2"),
+        (unequal, "shapes (3,) and (2,) do not fit together"),
+        (turned, "A is written while another part of it is read; use another array"),
+        (changing_step, "the step of a[::k] is not a constant"),
+    ],
+)
+def test_what_numpy_would_compute_otherwise_is_refused(function: Any, text: str) -> None:
+    with pytest.raises(EquationError) as error:
+        expand(function)
+    assert text in str(error.value) and f"{__file__}:" in str(error.value)
