@@ -29,16 +29,14 @@ import numpy as np
 
 from .mathematics.arrays import Array
 from .runtime.graph import Graph, load
-from .runtime.language.errors import AloftError
+from .runtime.language.errors import AloftError, pip_line
 from .runtime.language.signals import Signal
 from .runtime.running.stepping import SteppedRun
 
 try:
     import gymnasium
 except ModuleNotFoundError as error:
-    raise ModuleNotFoundError(
-        "aloft.gym needs Gymnasium: pip install 'aloft-robotics[gym]'"
-    ) from error
+    raise ModuleNotFoundError(f"aloft.gym needs Gymnasium: {pip_line('gym')}") from error
 
 Reward = str | Callable[[SteppedRun], float]
 _MOST_SEEDS = 2**31
