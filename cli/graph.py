@@ -109,7 +109,7 @@ def graph(
         if graph.suffix == ".rrd":
             from ..logs.replay.opened_run import OpenedRun, TickValues
 
-            opened = OpenedRun.of(graph)
+            opened = OpenedRun.of(graph, look=True)
             checked = opened.changed(overrides or [])
             values = TickValues(opened.file)
         else:

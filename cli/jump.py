@@ -90,7 +90,7 @@ def jump(
     """Plan a jump and run it: aloft jump --forward 20cm --up 5cm --turn 30deg."""
     from ..runtime.loading import flatten
     from ..studies.batch.seeds import parse_seeds
-    from ..studies.rehearsal import corrected_parameters
+    from ..studies.rehearsing.lift_off import corrected_parameters
 
     seeds, seed = running.seeds, running.seed
     out = console(to_stderr=as_json, quiet=quiet)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -65,14 +65,12 @@ def export(
         bool,
         typer.Option(
             "--mcap",
-            help="MCAP for Foxglove, PlotJuggler; needs pip install 'aloft-robotics[mcap]'.",
+            help="MCAP, for Foxglove and PlotJuggler (extra mcap).",
         ),
     ] = False,
     bag: Annotated[
         bool,
-        typer.Option(
-            "--bag", help="A ROS 2 bag, a folder; needs pip install 'aloft-robotics[mcap]'."
-        ),
+        typer.Option("--bag", help="A ROS 2 bag, a folder (extra mcap)."),
     ] = False,
     signal: Annotated[
         list[str] | None,
@@ -200,6 +198,7 @@ def merge(
 ) -> None:
     """Put the recordings of a run's parts, made on several machines, together into one."""
     from ..logs.recording.merged_run import (
+        joined_blocks,
         machine_of,
         merge_recordings,
         merged_outcome,
@@ -208,11 +207,14 @@ def merge(
     )
     from ..logs.replay.opened_run import OpenedRun
     from ..runtime.placement.placed import split_over_machines
-    from ..runtime.running.memory import BoundGraph
 
     with errors_reported(as_json):
         runs = {file: read(file) for file in files}
-        placed = split_over_machines(OpenedRun.of(files[0]).graph)
+        opened = OpenedRun.of(files[0], look=True)
+        blocks = joined_blocks(list(runs.values()))
+        header = replace(opened.file.header, blocks=blocks)
+        whole = replace(opened, file=replace(opened.file, header=header))
+        placed = split_over_machines(whole.graph)
         paths: dict[str, Path] = {}
         for file, run in runs.items():
             machine = machine_of(placed, run)
@@ -223,7 +225,7 @@ def merge(
         run_hash, ticks = run_hash_of(placed, parts)
         outcome = merged_outcome(placed, parts, run_hash, ticks)
         try:
-            written = merge_recordings(output, placed, BoundGraph(placed.graph), parts, outcome)
+            written = merge_recordings(output, placed, parts, outcome)
         except OSError as error:
             raise AloftError(f"{output} cannot be written: {error.strerror or error}") from error
     if as_json:

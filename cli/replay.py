@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.options import GraphFolder, JsonBesideTables, Quiet, opened_recording
+from .shared.options import GraphFolder, JsonBesideTables, Quiet, Trust, opened_recording
 from .shared.output import (
     SET_HELP,
     console,
@@ -62,13 +62,14 @@ def replay(
         typer.Option(help="Write recorded and replayed signals side by side to this .rrd file."),
     ] = None,
     folder: GraphFolder = None,
+    trust: Trust = False,
     as_json: JsonBesideTables = False,
     quiet: Quiet = False,
 ) -> None:
     """Execute a recorded run again and compare every byte of every tick with the recording."""
     out = console(to_stderr=as_json, quiet=quiet)
     with errors_reported(as_json):
-        opened = opened_recording(recording, folder)
+        opened = opened_recording(recording, folder, trust=trust)
         changed = changed_blocks(opened, swap or [], overrides or [])
         if changed and output is None:
             output = recording.with_name(f"{recording.stem}-replay.rrd")

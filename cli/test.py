@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.options import AsJson
+from .shared.options import AsJson, Trust
 from .shared.output import console, errors_reported, print_json, print_warning, say, table
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ def test(
         Path | None,
         typer.Option(help="With --from: where the graph file's folder is now, if it has moved."),
     ] = None,
+    trust: Trust = False,
     as_json: AsJson = False,
 ) -> None:
     """Test blocks: that they keep what every block promises, and your own tests with pytest.
@@ -67,7 +68,8 @@ def test(
         if recording is not None:
             if targets:
                 raise AloftError("with --from there is nothing else to test")
-            write(recording, block, ticks, output, rtol, atol, folder, out, as_json)
+            tolerances = rtol, atol
+            write(recording, block, ticks, output, tolerances, folder, out, trust, as_json)
             return
         if block or ticks or output:
             raise AloftError("--block, --ticks and --output go with --from RECORDING")
@@ -193,10 +195,10 @@ def write(
     block: str,
     ticks: str,
     output: Path | None,
-    rtol: float,
-    atol: float,
+    tolerances: tuple[float, float],
     folder: Path | None,
     out: Console,
+    trust: bool,
     as_json: bool,
 ) -> None:
     """Write a test from a recording. Raises ``AloftError``."""
@@ -208,13 +210,22 @@ def write(
     if not block or not ticks:
         raise AloftError("--from needs --block NAME and --ticks FIRST:END")
     first, last = parse_ticks(ticks)
-    opened = OpenedRun.of(recording, folder, restore=False)  # the test names present files
+    opened = OpenedRun.of(
+        recording, folder, restore=False, trust=trust
+    )  # the test names present files
     if output is None:
         start = Path("tests") if Path("tests").is_dir() else Path()
         output = start / f"test_{block.replace('/', '_')}_{first}_{last}.py"
     try:
         written = write_test(
-            opened, block, first, last, output, source=str(recording), rtol=rtol, atol=atol
+            opened,
+            block,
+            first,
+            last,
+            output,
+            source=str(recording),
+            rtol=tolerances[0],
+            atol=tolerances[1],
         )
     except OSError as error:
         raise AloftError(f"{output} cannot be written ({error.strerror or error})") from error

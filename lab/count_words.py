@@ -53,7 +53,7 @@ WORDS = {
     ),
     "call": Word(
         "an entry of the call table of a tick", "calls",
-        "ActiveCalls Call CallSequence ForeignCall KernelCall PythonCall ScheduledCall",
+        "ActiveCalls Call CallSequence ForeignCall KernelCall PythonCall ScheduledCall TickCall TickCalls",
     ),
     "place": Word("assign blocks to machines", "places placed", "PlacedGraph"),
 }  # fmt: skip

@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from pydantic import (
     ConfigDict,
     Field,
+    field_validator,
 )
 
+from ..files.names import is_file_name
 from ..mathematics.arrays import Array
 from ..mathematics.constants import GRAVITY
 from ..mathematics.linear_algebra import inverse, product
@@ -352,6 +354,16 @@ class RobotDescription(Element):
     """Supply of the motors; ``None`` where it is unknown."""
     looks: Mapping[str, Appearance] = {}
     """Appearance of links, by name; others are drawn as their collision shapes."""
+
+    @field_validator("name")
+    @classmethod
+    def _name(cls, value: str) -> str:
+        if not is_file_name(value):
+            raise ValueError(
+                f"{value!r} cannot be the name of a robot, which names files: expected one without "
+                "'/', backslash and '..'"
+            )
+        return value
 
     def __eq__(self, other: object) -> bool:
         """Check whether all fields are equal; pydantic compares cached arrays, too."""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import ast
 import shutil
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +11,7 @@ import yaml
 
 from ..files.nodes import ScalarNode, plain
 from ..robots.description import ROBOT_FILES, RobotDescription
+from .language.block_files import imported_files
 from .language.flat_graph import FlatGraph
 
 _OURS = Path(__file__).parents[1]
@@ -57,23 +56,5 @@ def copy_module(name: str, imported: str, folder: Path) -> None:
             continue
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(each, copy)
-        pending += [p for p in _imported(each, root) if not (folder / p.relative_to(root)).exists()]
-
-
-def _imported(file: Path, root: Path) -> Iterator[Path]:
-    """Yield the files below ``root`` that a module imports, with the packages they are in."""
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        names: list[str] = []
-        base = root
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            base = file.parents[node.level - 1] if node.level else root
-            module = node.module or ""
-            names = [module, *(f"{module}.{alias.name}".strip(".") for alias in node.names)]
-        for name in filter(None, names):
-            parts = name.split(".")
-            places = [base.joinpath(*parts[:k], "__init__.py") for k in range(1, len(parts) + 1)]
-            for place in (*places, base.joinpath(*parts).with_suffix(".py")):
-                if place.is_file() and place.is_relative_to(root) and _OURS not in place.parents:
-                    yield place
+        found = imported_files(each, root)
+        pending += [p for p in found if not (folder / p.relative_to(root)).exists()]

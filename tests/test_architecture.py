@@ -24,7 +24,7 @@ PACKAGES = (*CORE, "extensions", "lab")
 ALLOWED: dict[str, tuple[str, ...]] = {
     "processes": (),
     "files": ("runtime/language/errors", "runtime/language/units"),
-    "mathematics": ("processes",),
+    "mathematics": ("processes", "files/cache"),
     "robots": ("files", "mathematics"),
     "runtime/language": ("files", "robots", "mathematics/compiling", "mathematics/kernel", "mathematics/arrays", "mathematics/elementary", "mathematics/ground_surface"),
     "runtime/running": (
@@ -59,18 +59,18 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "planner/models": ("planner/task", "mathematics", "robots"),
     "planner/problem": ("planner/task", "planner/models", "mathematics", "robots"),
     "planner/solving": (
-        "processes", "planner/task", "planner/models", "planner/problem", "mathematics", "robots",
+        "processes", "files/cache", "planner/task", "planner/models", "planner/problem", "mathematics", "robots",
     ),
     "planner/checking": (
         "planner/task", "planner/models", "mathematics", "robots", "runtime/language",
     ),
     "planner/library": (
         "planner/task", "planner/models", "planner/problem", "planner/solving", "planner/checking",
-        "mathematics", "robots", "runtime/language",
+        "files/cache", "mathematics", "robots", "runtime/language",
     ),
     "extensions/hopping/planner": (
         "planner/task", "planner/models", "planner/problem", "planner/solving", "planner/checking", "planner/library",
-        "mathematics", "robots", "runtime/language",
+        "files/cache", "mathematics", "robots", "runtime/language",
     ),
     "planner/drawing": (
         "planner/task", "planner/models", "planner/checking", "planner/library", "mathematics/arrays", "robots",
@@ -81,13 +81,13 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "blocks/jumping": ("blocks/signals", "mathematics", "robots", "runtime/language", "planner"),
     "blocks/scoring": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "hal": ("processes", "files", "blocks/signals", "mathematics", "robots", "runtime/language"),
-    "logs/file": ("robots", "runtime/language", "runtime/running"),
+    "logs/file": ("files", "robots", "runtime/language", "runtime/running"),
     "logs/viewing": ("files", "logs/file", "hal/sensors", "mathematics", "robots", "runtime/language"),
     "logs/recording": (
         "processes", "logs/file", "logs/viewing", "mathematics", "robots", "runtime/language", "runtime/running",
         "runtime/placement", "runtime/links",
     ),
-    "logs/replay": ("files", "logs/file", "logs/viewing", "robots", "runtime"),
+    "logs/replay": ("files", "blocks/signals", "logs/file", "logs/viewing", "robots", "runtime"),
     "logs/exporting": (
         "logs/file", "hal/sensors", "logs/viewing", "mathematics", "robots", "runtime/language",
     ),

@@ -88,7 +88,7 @@ def learn_jumps(
     """
     assert options.learn is not None
     file = options.learn.absolute()
-    from ...studies.jump_learning import ladder
+    from ...studies.rehearsing.learning import ladder
 
     tasks = [*(ladder(asked, rise) if options.ladder else ()), *[dict(asked)] * options.times]
     attempts: list[Attempt] = []
@@ -150,7 +150,7 @@ def recorded_run(graph: Graph, record: Path, as_json: bool) -> RunResult:
 def taught(result: RunResult, plan: PlannedJump, learnt: LearntJumps) -> Attempt:
     """Judge a jump that had the corrections in ``learnt``."""
     from ...planner.library.learnt import launch_of
-    from ...studies.jump_learning import lesson_of
+    from ...studies.rehearsing.learning import lesson_of
 
     graph = result.graph
     assert graph is not None and graph.robot is not None

@@ -30,13 +30,19 @@ if TYPE_CHECKING:
     from ...logs.replay.opened_run import OpenedRun
 
 
-def opened_recording(recording: Path, folder: Path | None) -> OpenedRun:
-    """Open the recorded run of a verb's arguments. Raises ``AloftError`` if there is none."""
+def opened_recording(
+    recording: Path, folder: Path | None, *, look: bool = False, trust: bool = False
+) -> OpenedRun:
+    """Open the recorded run of a verb's arguments, to ``look`` at it or to run it again.
+
+    Raises:
+        AloftError: there is none.
+    """
     from ...logs.replay.opened_run import OpenedRun
 
     if not recording.is_file():
         raise AloftError(f"there is no recording {recording}")
-    return OpenedRun.of(recording, folder)
+    return OpenedRun.of(recording, folder, look=look, trust=trust)
 
 
 def block_names(incomplete: str) -> list[str]:
@@ -49,13 +55,15 @@ def block_names(incomplete: str) -> list[str]:
 def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
     """List the parameters, as ``block.parameter=``, of the graph on the command line that begin
     with a text."""
+    from ...runtime.language.importing import without_imports
     from ...runtime.language.parameters import declared_fields
     from ...runtime.loading import LoadError, checked_file
 
     # Arguments in front of an option that still waits for its value are not parsed yet.
     given = context.params.get("graph") or next(iter(context.args), "")
     try:
-        graph = checked_file(str(given))
+        with without_imports():  # a key that is pressed runs no code
+            graph = checked_file(str(given))
     except LoadError:
         return []  # no graph yet, or one that may not run: nothing to offer
     names = [
@@ -74,6 +82,13 @@ JsonBesideTables = Annotated[
 GraphFolder = Annotated[
     Path | None,
     typer.Option("--folder", help="The graph file's folder, if it has moved."),
+]
+Trust = Annotated[
+    bool,
+    typer.Option(
+        "--trust",
+        help="Run the code that the recording names and that is not aloft's; remembered for its content.",
+    ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")]
 NoRecord = Annotated[bool, typer.Option("--no-record", help="Write no recording.")]

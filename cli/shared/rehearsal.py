@@ -48,7 +48,7 @@ def rehearsal(
 ) -> dict[str, Any]:  # fmt: skip
     """Rehearse a kept plan in a graph if that is ``wanted``, and show what was learnt now or before.
 
-    With ``landing`` it is rehearsed as far as its landing (``studies/landing_rehearsal``).
+    With ``landing`` it is rehearsed as far as its landing (``studies/rehearsing/landing``).
 
     Returns:
         What the plan's JSON object says of it: nothing where nothing was rehearsed.
@@ -65,8 +65,8 @@ def rehearsal(
     )
     from ...runtime.graph import load
     from ...runtime.loading import flatten
-    from ...studies.landing_rehearsal import rehearse_landing, response
-    from ...studies.rehearsal import LEVER, corrected_parameters, rehearse
+    from ...studies.rehearsing.landing import rehearse_landing, response
+    from ...studies.rehearsing.lift_off import LEVER, corrected_parameters, rehearse
 
     if not wanted and not was_rehearsed(library, task):
         return {}

@@ -64,7 +64,7 @@ def require_one_or_many(running: TrialOptions, recording: RecordOptions) -> None
 def trial_settings_of(running: TrialOptions) -> list[str]:
     """Return the overrides of a graph for the requested trial, before the user's own."""
     from ...files.nodes import text_of
-    from ...studies.rehearsal import trial_settings
+    from ...studies.trials import trial_settings
 
     return [f"{key}={text_of(value)}" for key, value in trial_settings(running.trial).items()]
 

@@ -288,8 +288,8 @@ def print_result(out: Console, name: str, result: RunResult, *, times: bool = Tr
         f"{result.ticks} ticks, {result.duration_s:.3f} s of the graph in "
         f"{result.wall_time_s:.2f} s ({speed:.1f} x real time); run hash {result.run_hash}",
     )
-    if result.overruns:
-        say(out, f"{result.overruns} overruns, {result.skipped_periods} periods skipped")
+    if result.lateness is not None:
+        say(out, f"{result.lateness}; {result.skipped_periods} periods skipped")
 
 
 def print_verdict(result: RunResult) -> None:

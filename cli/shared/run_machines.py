@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...files.names import inside
 from ...processes.child_process import ChildProcess
 from ...runtime.language.errors import AloftError, ExitCode, RunError
 from ...runtime.language.stages import CheckedGraph
@@ -27,7 +28,7 @@ from ...runtime.links.path_ages import NAME
 from ...runtime.live.part_feed import PartFeed
 from ...runtime.loading import checked_file
 from ...runtime.placement.placed import PlacedGraph, split_over_machines
-from ...runtime.running.memory import BoundGraph
+from ...runtime.running.lateness import TickLateness
 from ...runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
 from ...runtime.running.run_result import RunResult, merge_metrics
 from ...runtime.running.sink import Sink
@@ -80,7 +81,9 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
     placed = split_over_machines(checked_file(path, options.settings))
     graph = placed.graph
     with tempfile.TemporaryDirectory(prefix="aloft-parts-") as folder:
-        files = {machine.name: Path(folder) / f"{machine.name}.rrd" for machine in placed.machines}
+        files = {
+            machine.name: inside(Path(folder), f"{machine.name}.rrd") for machine in placed.machines
+        }
         part_reports = _run_processes(path, options, placed, files)
         parts = read_parts(placed, files) if all(f.exists() for f in files.values()) else {}
         run_hash, ticks = run_hash_of(placed, parts) if parts else ("", 0)
@@ -96,9 +99,7 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
             )
             try:
                 if parts:
-                    recording = merge_recordings(
-                        target, placed, BoundGraph(graph), parts, result.to_json()
-                    )
+                    recording = merge_recordings(target, placed, parts, result.to_json())
             except OSError as error:
                 why = error.strerror or error
                 problem = f"no whole recording: {target} cannot be written ({why})"
@@ -237,6 +238,7 @@ def _whole_result(
         blocks=_times(graph, part_reports),
         overruns=sum(part.get("overruns", 0) for part in part_reports.values()),
         skipped_periods=sum(part.get("skipped_periods", 0) for part in part_reports.values()),
+        lateness=TickLateness.merged(part.get("lateness") for part in part_reports.values()),
         error=error,
         stop_problems=_collected(part_reports, "stop_problems"),
         block_warnings=_collected(part_reports, "block_warnings"),

@@ -61,7 +61,7 @@ def diagram_of(run: RecordedRun) -> bytes:
     if not is_provided("diagram_png"):
         return b""
     try:
-        graph = OpenedRun(run, Path(run.header.source).parent).graph
+        graph = OpenedRun(run, Path(run.header.source).parent, look=True).graph
     except (AloftError, OSError):
         return b""
     picture = io.BytesIO()

@@ -20,7 +20,8 @@ from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
 
-from ...runtime.language.errors import AloftError
+from ...files.names import inside
+from ...runtime.language.errors import AloftError, pip_line
 from ...runtime.placement.placed import PlacedGraph
 from ...runtime.transports.tls import (
     AUTHORITY,
@@ -81,7 +82,7 @@ class Authority:
 
     def write(self, folder: Path) -> None:
         """Keep both files; only the owner can read the key."""
-        folder.mkdir(parents=True, exist_ok=True)
+        _own_folder(folder)
         (folder / AUTHORITY).write_bytes(_pem(self.certificate))
         _write_secret(folder / AUTHORITY_KEY, self.key)
 
@@ -109,7 +110,7 @@ class Authority:
                 x509.SubjectAlternativeName([_host(host) for host in hosts]), critical=False
             )
         )
-        folder.mkdir(parents=True, exist_ok=True)
+        _own_folder(folder)
         (folder / CERTIFICATE).write_bytes(_pem(builder.sign(self.key, hashes.SHA256())))
         _write_secret(folder / KEY, key)
         (folder / AUTHORITY).write_bytes(_pem(self.certificate))
@@ -142,7 +143,7 @@ def _library() -> tuple[Any, Any, Any]:
         from cryptography.hazmat.primitives.asymmetric import ec
     except ImportError as error:
         raise AloftError(
-            "certificates are made with the library cryptography: pip install 'aloft-robotics[keys]'"
+            f"certificates are made with the library cryptography: {pip_line('keys')}"
         ) from error
     return x509, hashes, ec
 
@@ -191,6 +192,12 @@ def _pem(certificate: Any) -> bytes:
 
     data: bytes = certificate.public_bytes(Encoding.PEM)
     return data
+
+
+def _own_folder(folder: Path) -> None:
+    """Make a folder that only its owner can enter, also where it was there before."""
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    folder.chmod(0o700)
 
 
 def _write_secret(path: Path, key: Any) -> None:
@@ -246,7 +253,7 @@ def make_keys(
         authority = Authority.read(folder)
     made = []
     for name in (*machines, *observers):
-        own = folder / name
+        own = inside(folder, name)
         hosts = list(_LOOPBACK)
         if name in machines:
             host = host_of(placed.machine(name).endpoint)

@@ -10,15 +10,25 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.language.errors import BlockError
+from ...runtime.language.errors import BlockError, pip_line
 from ...runtime.language.signals import Field, Signal
+from .headers import (
+    FrameNames,
+    OtherMessageError,
+    Texts,
+    WrongMessageError,
+    governing_text,
+    is_absent,
+    sent_quaternion,
+    unit_quaternions,
+)
 
 STAMP = "builtin_interfaces/msg/Time"
 _FLOATS = ("float32", "float64")
@@ -101,7 +111,7 @@ def type_store(distribution: str) -> Any:
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
         raise BlockError(
-            "ROS 2's message types come with the library rosbags: pip install 'aloft-robotics[ros2]'"
+            f"ROS 2's message types come with the library rosbags: {pip_line('ros2')}"
         ) from error
     name = f"ROS2_{distribution.upper()}"
     if name not in Stores.__members__:
@@ -125,14 +135,16 @@ class MessageType:
         sizes: of lists by their path in the message, with dots; a number or a dimension's name.
         fields: the names of the fields that the signal has; by default all but covariances and
             the layout of arrays, which stay zero, as ROS 2 says that they are not known.
+        frame: of the numbers, where it is another than the type's first, such as a sensor's.
 
     Raises:
         BlockError: the type is not known, a size is of no list, or no numbers are left.
     """
 
     def __init__(
-        self, name: str, distribution: str, sizes: Mapping[str, Size], fields: Sequence[str] = ()
-    ) -> None:
+        self, name: str, distribution: str, sizes: Mapping[str, Size], fields: Sequence[str] = (),
+        frame: str | None = None,
+    ) -> None:  # fmt: skip
         self.store = type_store(distribution)
         self.name = full_type(name)
         if self.name not in self.store.fielddefs:
@@ -152,9 +164,20 @@ class MessageType:
             raise BlockError(
                 f"{self.name} has no field {wrong[0]!r}; its fields are {', '.join(names)}"
             )
+        own = next((leaf.frame for leaf in found if leaf.frame is not None), None)
         self.leaves = tuple(
-            leaf for leaf in found if (leaf.name in fields if fields else leaf.is_usual)
+            replace(leaf, frame=frame) if frame and own is not None and leaf.frame == own else leaf
+            for leaf in found
+            if (leaf.name in fields if fields else leaf.is_usual)
         )
+        self.claims = dict.fromkeys(
+            (path, leaf.frame, leaf.listed)
+            for leaf in self.leaves
+            if leaf.frame is not None
+            and (path := governing_text(leaf.path, leaf.frame, self.texts)) is not None
+        )
+        """The texts that name frames, each with the frame of the numbers beside it and the place of a
+        list in its path, or -1."""
         unknown = [path for path in sizes if path not in self.lists]
         if unknown:
             known = ", ".join([*self.lists, *self._empty]) or "none"
@@ -177,7 +200,7 @@ class MessageType:
         body: dict[str, Any] = {
             leaf.name: Field(
                 leaf.shape, unit=leaf.unit, frame=leaf.frame, dtype=leaf.dtype,
-                text=f"{'.'.join(leaf.path)} of {self.name}",
+                text=f"{'.'.join(leaf.path)} of {self.name}", quaternion=leaf.parts == "xyzw",
             )
             for leaf in self.leaves
         }  # fmt: skip
@@ -250,14 +273,9 @@ class MessageType:
 
 
 Values = Mapping[str, NDArray[Any]]
-Texts = Mapping[str, str | Sequence[str]]
 _OTHER = {"byte": "uint8", "octet": "uint8", "char": "uint8"}
 CDR_HEADER = 4
 """Bytes before the message itself, which say how it is encoded."""
-
-
-class WrongMessageError(ValueError):
-    """A message does not fit the signal: a list of another length, a name that is missing."""
 
 
 def numpy_type(base: str) -> np.dtype[Any]:
@@ -274,6 +292,7 @@ class Codec:
         texts: the texts of written messages by their path with dots, one for each message of a list.
             ``frame_id`` stands for every frame of a header.
         order: the names that lists are in the order of, where messages read have a list ``name``.
+        frames: the names that frames may have in messages read; by default none is checked.
 
     Raises:
         BlockError: a text is of no such path, or their number is wrong.
@@ -281,13 +300,18 @@ class Codec:
 
     def __init__(
         self, message_type: MessageType, dimensions: Mapping[str, int], texts: Texts,
-        order: Sequence[str] = (),
+        order: Sequence[str] = (), frames: FrameNames | None = None,
     ) -> None:  # fmt: skip
         self.type = message_type
         self._store = message_type.store
         self._dimensions = dimensions
         self._texts = texts
         self._order = tuple(order)
+        self._frames = frames
+        self.absent: dict[str, int] = {}
+        """Numbers of messages read that say that they have no value of a field."""
+        self.assumed: dict[str, str] = {}
+        """Frames by the names that messages read have for them, where nothing else says that they are these."""
         self._stamps: list[Any] = []
         unknown = [t for t in texts if t != "frame_id" and t not in message_type.texts]
         if unknown:
@@ -315,19 +339,37 @@ class Codec:
         data = self._store.serialize_cdr(self._message, self.type.name, little_endian=True)
         return bytes(data)
 
-    def read(self, data: bytes) -> dict[str, NDArray[Any]]:
+    def blank(self) -> dict[str, NDArray[Any]]:
+        """Return the numbers before the first message: zeros, and quaternions that turn nothing."""
+        fields = self.type.signal.fields
+        return {name: fields[name].blank(shape) for name, shape in self.shapes.items()}
+
+    def read(self, data: bytes, before: Values | None = None) -> dict[str, NDArray[Any]]:
         """Return the numbers in the bytes of a message.
+
+        Args:
+            data: the bytes.
+            before: the numbers of the transforms that a message does not have; by default ``blank``.
 
         Raises:
             WrongMessageError: it is no message of this type, or does not fit the signal.
+            OtherMessageError: it has none of the transforms that the texts name.
         """
         if len(data) < CDR_HEADER:
             raise WrongMessageError(f"it has {len(data)} bytes")
         try:
             message = self._store.deserialize_cdr(data, self.type.name)
             rank = self._rank(message)
-            found = {leaf.name: self._get(message, leaf, rank) for leaf in self.type.leaves}
-        except WrongMessageError:
+            before = before or self.blank()
+            picked = self._pick(message)
+            self._check_frames(message, picked)
+            found = {
+                leaf.name: self._picked(picked, leaf, before[leaf.name])
+                if picked is not None and leaf.listed >= 0
+                else self._get(message, leaf, rank)
+                for leaf in self.type.leaves
+            }
+        except (WrongMessageError, OtherMessageError):
             raise
         except Exception as error:  # whatever the library raises of foreign bytes
             raise WrongMessageError(f"{type(error).__name__}: {error}") from error
@@ -335,6 +377,78 @@ class Codec:
             if value.dtype.kind == "f" and not np.isfinite(value).all():
                 raise WrongMessageError(f"{name} is not finite")
         return found
+
+    def _pick(self, message: Any) -> dict[int, Any] | None:
+        """Return the elements of the message's list that the texts name, by their place in the signal;
+        ``None`` where no names are given, or there is no such list.
+
+        Raises:
+            OtherMessageError: it has none of them, or the one message is another's.
+        """
+        for path, names in self._texts.items():
+            steps = path.split(".")
+            if steps[-1] != "child_frame_id" or self._frames is None:
+                continue
+            if isinstance(names, str):
+                name = _follow(message, steps).lstrip("/") if len(self.type.lists) == 0 else names
+                if name and name != names.lstrip("/"):
+                    raise OtherMessageError(name)
+                continue
+            places = {name.lstrip("/"): k for k, name in enumerate(names)}
+            elements = _follow(message, steps[:-1])
+            found = {
+                places[name]: element
+                for element in elements
+                if (name := element.child_frame_id.lstrip("/")) in places
+            }
+            if not found:
+                raise OtherMessageError(", ".join(each.child_frame_id for each in elements))
+            return found
+        return None
+
+    def _check_frames(self, message: Any, picked: Mapping[int, Any] | None) -> None:
+        """Compare the frames that the message names with those of the signal.
+
+        Raises:
+            WrongMessageError: one is another frame.
+        """
+        if self._frames is None:
+            return
+        for path, frame, listed in self.type.claims:
+            steps = path.split(".")
+            owners: Sequence[Any] = [message]
+            if listed >= 0:
+                elements = _follow(message, steps[: listed + 1])
+                owners = list(picked.values()) if picked is not None else elements
+                steps = steps[listed + 1 :]
+            for owner in owners:
+                name = _follow(owner, steps)
+                if not self._frames.is_frame(name, frame, path):
+                    raise WrongMessageError(f"{path} is {name!r}, and the signal is in {frame}")
+                if not self._frames.is_known(name, frame, path):
+                    self.assumed[name] = frame
+
+    def _picked(self, picked: Mapping[int, Any], leaf: Leaf, before: NDArray[Any]) -> NDArray[Any]:
+        result = np.array(before)
+        for k, element in picked.items():
+            result[k] = self._value(_follow(element, leaf.path[leaf.listed + 1 : -1]), leaf)
+        return result
+
+    def _value(self, owner: Any, leaf: Leaf) -> NDArray[Any]:
+        """Return the numbers of a leaf in the object that owns it; as before the first message where it
+        says that there are none."""
+        name = leaf.path[-1]
+        if is_absent(owner, name):
+            self.absent[leaf.name] = self.absent.get(leaf.name, 0) + 1
+            value = np.zeros(len(leaf.parts)) if leaf.parts else np.zeros_like(getattr(owner, name))
+            if leaf.parts == "xyzw":
+                value[3] = 1.0
+            return value
+        value = getattr(owner, name)
+        if leaf.parts:
+            value = [getattr(value, part) for part in leaf.parts]
+        value = np.asarray(value, leaf.dtype)
+        return unit_quaternions(value, ".".join(leaf.path)) if leaf.parts == "xyzw" else value
 
     def _rank(self, message: Any) -> NDArray[np.int64] | None:
         """Return the places in the message's lists of the names in ``order``."""
@@ -350,10 +464,7 @@ class Codec:
         shape = self.shapes[leaf.name]
         found = []
         for _, owner in self._owners(message, leaf):
-            value = getattr(owner, leaf.path[-1])
-            if leaf.parts:
-                value = [getattr(value, part) for part in leaf.parts]
-            found.append(np.asarray(value, leaf.dtype))
+            found.append(self._value(owner, leaf))
         result = np.stack(found) if leaf.listed >= 0 and found else np.array(found)
         if leaf.listed < 0:
             result = result[0]
@@ -402,6 +513,8 @@ class Codec:
                 values[field] = self._build(argument, here, index)
             else:
                 values[field] = self._build_list(argument, here, node.name == "ARRAY")
+        if _VECTORS.get(type_name) == "xyzw":
+            values["w"] = 1.0  # no turn, where nobody gives one
         return self._store.types[type_name](**values)
 
     def _build_list(self, argument: Any, path: tuple[str, ...], fixed: bool) -> Any:
@@ -439,6 +552,8 @@ def _put(owner: Any, leaf: Leaf, value: NDArray[Any]) -> None:
     name = leaf.path[-1]
     if leaf.parts:
         vector = getattr(owner, name)
+        if leaf.parts == "xyzw":
+            value = sent_quaternion(value)
         for part, number in zip(leaf.parts, value.tolist(), strict=True):
             setattr(vector, part, number)
         return

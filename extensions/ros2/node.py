@@ -103,12 +103,13 @@ def attachment(sequence: int, time: int, gid: bytes) -> bytes:
     return _ATTACHMENT.pack(sequence, time, 16, gid)
 
 
-def sequence_in(data: bytes) -> int | None:
-    """Return the number of a message, from what came beside it; ``None`` if that is something else."""
+def sender_in(data: bytes) -> tuple[bytes, int] | None:
+    """Return who sent a message (16 bytes) and its number, from what came beside it; ``None`` if that is
+    something else."""
     if len(data) != ATTACHMENT:
         return None
-    sequence, _, length, _ = _ATTACHMENT.unpack(data)
-    return int(sequence) if length == 16 else None
+    sequence, _, length, gid = _ATTACHMENT.unpack(data)
+    return (gid, int(sequence)) if length == 16 else None
 
 
 RETRY = 0.5

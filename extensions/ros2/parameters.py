@@ -13,6 +13,7 @@ from ...runtime.language.block import Block, Context, UnmetRequirement
 from ...runtime.language.errors import BlockError
 from ...runtime.language.parameters import Parameters, parameter
 from .codec import Codec, MessageType
+from .headers import WORLDS, FrameNames, unclear_frame
 from .node import NodeAddress, Quality, is_topic
 
 FRAMES = {"body": "base_link", "world": "world"}
@@ -29,6 +30,10 @@ class Ros2Parameters(Parameters):
     )
     fields: list[str] = parameter(
         [], text="the fields of the signal; none: all but covariances and layouts, which are zero"
+    )
+    frame: str | None = parameter(
+        None,
+        text="frame of the numbers in the graph, as world or a sensor's; by default the type's",
     )
     distribution: str = parameter("jazzy", text="of ROS 2, for types and their hashes")
     domain: int = parameter(0, ge=0, le=232, text="ROS_DOMAIN_ID")
@@ -48,15 +53,16 @@ class Ros2Parameters(Parameters):
 
 @lru_cache(maxsize=64)
 def _type(
-    name: str, distribution: str, sizes: tuple[tuple[str, int | str], ...], fields: tuple[str, ...]
-) -> MessageType:
-    return MessageType(name, distribution, dict(sizes), fields)
+    name: str, distribution: str, sizes: tuple[tuple[str, int | str], ...], fields: tuple[str, ...],
+    frame: str | None,
+) -> MessageType:  # fmt: skip
+    return MessageType(name, distribution, dict(sizes), fields, frame)
 
 
 def message_type(params: Ros2Parameters) -> MessageType:
     """Return the message type that parameters ask for. Raises ``BlockError``."""
     sizes = tuple(params.sizes.items())
-    return _type(params.type, params.distribution, sizes, tuple(params.fields))
+    return _type(params.type, params.distribution, sizes, tuple(params.fields), params.frame)
 
 
 def quality(params: Ros2Parameters) -> Quality:
@@ -98,6 +104,9 @@ class Ros2Block(Block):
                 Codec(found, sizes, texts_of(params, robot, found))
         except BlockError as error:
             yield UnmetRequirement(str(error), parameter="type", found=params.type)
+            return
+        yield from _unnamed_transforms(params, found)
+        yield from _unclear_frames(params, robot, found)
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
@@ -114,7 +123,55 @@ class Ros2Block(Block):
         texts = texts_of(self.params, context.robot, found)
         given = texts.get("name", order)
         names = [given] if isinstance(given, str) else list(given)
-        return Codec(found, context.dimensions, texts, names)
+        robot = context.robot
+        frames = FrameNames(
+            "" if robot is None else robot.base,
+            () if robot is None else tuple(link.name for link in robot.links),
+            getattr(self.params, "texts", {}),
+        )
+        return Codec(found, context.dimensions, texts, names, frames)
+
+
+def _unnamed_transforms(params: Ros2Parameters, found: MessageType) -> Iterable[UnmetRequirement]:
+    """Report a list of transforms that does not say whose they are."""
+    texts = getattr(params, "texts", {})
+    for path in found.texts:
+        owner, _, name = path.rpartition(".")
+        if name != "child_frame_id" or owner not in found.lists:
+            continue
+        names, size = texts.get(path, ()), found.lists[owner]
+        names = [names] if isinstance(names, str) else list(names)
+        if not names or len(set(names)) < len(names):
+            yield UnmetRequirement(
+                f"it does not say whose {owner} they are"
+                if not names
+                else f"{path} has a name twice",
+                parameter="texts",
+                expected=f"{size} different names",
+                found=", ".join(names) or "none",
+                fix=f"texts: {{{path}: [foot, ...]}}",
+            )
+
+
+def _unclear_frames(
+    params: Ros2Parameters, robot: RobotDescription | None, found: MessageType
+) -> Iterable[UnmetRequirement]:
+    """Report a header's frame that contradicts the frame of the numbers, and no ``frame`` that explains it."""
+    given = getattr(params, "texts", {})
+    base = "" if robot is None else robot.base
+    for path, frame, _ in found.claims:
+        name = given.get(path, given.get("frame_id"))
+        if params.frame is not None or not isinstance(name, str) or path.endswith("child_frame_id"):
+            continue
+        if unclear_frame(name, frame, base):
+            yield UnmetRequirement(
+                f"{path} is {name!r}, and the numbers of {found.name} are taken to be in {frame}",
+                parameter="texts",
+                expected=", ".join(WORLDS) if frame == "world" else "a frame of the body",
+                found=name,
+                fix=f"frame: {name}, or frame: {frame} where the two are the same",
+            )
+            return
 
 
 def texts_of(

@@ -52,6 +52,7 @@ class Publish(Ros2Block):
 
     Params = PublishParameters
     params: PublishParameters
+    acts_outside = True
     message: Signal
 
     @classmethod

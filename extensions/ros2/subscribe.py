@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,9 +13,12 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Metric, Output
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
-from .codec import WrongMessageError
-from .node import Endpoint, Node, join, leave, sequence_in
+from .headers import OtherMessageError, WrongMessageError
+from .node import Endpoint, Node, join, leave, sender_in
 from .parameters import Ros2Block, Ros2Parameters, address, message_type, quality
+
+SENDERS = 64
+"""Senders of one topic whose numbers are remembered."""
 
 
 class TopicHealth(Signal):
@@ -24,15 +27,20 @@ class TopicHealth(Signal):
     age = Field(unit="s", text="since the newest message came; before it, since the run began")
     late = Field(dtype="bool", text="whether that is more than max_age")
     received = Field(dtype="int64", text="messages so far")
-    lost = Field(dtype="int64", text="messages that never came, by the gaps in their numbers")
-    refused = Field(dtype="int64", text="messages that did not fit the type or the sizes")
+    lost = Field(
+        dtype="int64", text="messages that never came, by the gaps in each sender's numbers"
+    )
+    refused = Field(dtype="int64", text="messages that did not fit the type, sizes or frames")
+    absent = Field(dtype="int64", text="values that messages said they do not have")
 
 
 class SubscribeParameters(Ros2Parameters):
     """The parameters of ``ros2.Subscribe``."""
 
-    texts: dict[str, list[str]] = parameter(
-        {}, text="name: the joints' names, in the order of the signal; by default the robot's"
+    texts: dict[str, str | list[str]] = parameter(
+        {},
+        text="name: the joints' names, in the order of the signal, by default the robot's; frame_id: "
+        "the frame that messages must have; transforms.child_frame_id: whose transforms",
     )
     max_age: float | None = parameter(
         None, unit="s", gt=0, text="after so long without a message `late` takes effect"
@@ -46,10 +54,17 @@ class Subscribe(Ros2Block):
     """Has the newest message of a topic of ROS 2 over Zenoh (rmw_zenoh, Jazzy and newer), without ROS.
 
     The output ``message`` has the fields that ``ros2.Publish`` describes, zero before the first
-    message. Messages are read on a thread of Zenoh; this block only copies numbers. A message whose
-    lists have other sizes, with numbers that are not finite, or that is none of this type is refused
-    and counted. Joints are put into the robot's order by their names. ``health`` says how old the
-    newest message is. A type of another hash, as after a change of the definition, is not heard.
+    message, and quaternions the identity. Messages are read on a thread of Zenoh; this block only copies
+    numbers. A message whose lists have other sizes, with numbers that are not finite, a quaternion whose
+    length is not one, or that is none of this type is refused and counted. Joints are put into the robot's
+    order by their names, transforms into that of ``texts: {transforms.child_frame_id: [...]}``; a message
+    of other transforms is not for this block. ``health`` says how old the newest message is. A type of
+    another hash, as after a change of the definition, is not heard.
+
+    The frame that a header names must be the frame of the signal: of the world ``world``, ``map`` or
+    ``odom``, of the body any but these and but other links of the robot, else the frame itself. A message
+    in another one is refused; ``frame`` and ``texts: {frame_id: ...}`` say what is meant. A value whose
+    covariance begins with -1 is not there: it stays as before the first message, and ``absent`` counts it.
 
     A replay takes the outputs from the recording.
     """
@@ -75,11 +90,12 @@ class Subscribe(Ros2Block):
     def setup(self) -> None:
         """Find the views that messages are copied to."""
         self._codec = self.codec()
-        self._zeros = {name: np.zeros_like(view) for name, view in self.message}
+        self._blank = {name: np.array(view) for name, view in self.message}
         self._targets = dict(iter(self.message))
         self._newest: tuple[Mapping[str, Any], int] | None = None
         self._received = self._lost = self._refused = 0
-        self._sequence: int | None = None
+        self._sequences: dict[bytes, int] = {}
+        self._refusal = ""
         self._node: Node | None = None
 
     def start(self) -> None:
@@ -99,7 +115,7 @@ class Subscribe(Ros2Block):
         if late and self.params.late == "stop":
             self.request_stop(f"nothing has come on {self.params.topic} for {age * 1e3:.0f} ms")
         safe = late and self.params.late == "safe"
-        values = self._zeros if newest is None or safe else newest[0]
+        values = self._blank if newest is None or safe else newest[0]
         for name, target in self._targets.items():
             np.copyto(target, values[name])
         health = self.health
@@ -108,6 +124,7 @@ class Subscribe(Ros2Block):
         health.received[()] = self._received
         health.lost[()] = self._lost
         health.refused[()] = self._refused
+        health.absent[()] = sum(self._codec.absent.values())
 
     def close(self) -> None:
         """Leave."""
@@ -119,17 +136,38 @@ class Subscribe(Ros2Block):
         """Return the number of messages received."""
         return {"received": self._received, "refused": self._refused}
 
+    def warnings(self) -> Sequence[str]:
+        """Return why messages were refused, and what was taken for granted or not there."""
+        topic, found = self.params.topic, []
+        if self._refused:
+            found.append(
+                f"{topic}: {self._refused} messages were refused, the last: {self._refusal}"
+            )
+        for name, frame in self._codec.assumed.items():
+            found.append(
+                f"{topic}: the frame {name!r} is taken for {frame}; texts: {{frame_id: {name}}} says so"
+            )
+        for field, count in self._codec.absent.items():
+            found.append(f"{topic}: {count} messages say that they have no {field}")
+        return found
+
     def hear(self, data: bytes, beside: bytes = b"") -> None:
         """Take a message; a thread of Zenoh calls this."""
-        sequence = sequence_in(beside)
-        if sequence is not None:  # before the message is read: one that is refused has come
-            if self._sequence is not None and sequence > self._sequence + 1:
-                self._lost += sequence - self._sequence - 1
-            self._sequence = sequence
+        sender = sender_in(beside)
+        if sender is not None:  # before the message is read: one that is refused has come
+            gid, sequence = sender
+            last = self._sequences.pop(gid, sequence)
+            self._lost += max(sequence - last - 1, 0)
+            self._sequences[gid] = sequence
+            if len(self._sequences) > SENDERS:
+                del self._sequences[next(iter(self._sequences))]
         try:
-            values = self._codec.read(data)
-        except WrongMessageError:
+            values = self._codec.read(data, None if self._newest is None else self._newest[0])
+        except OtherMessageError:
+            return
+        except WrongMessageError as error:
             self._refused += 1
+            self._refusal = str(error)
             return
         self._received += 1
         self._newest = (values, time.monotonic_ns())

@@ -26,8 +26,9 @@ import numpy as np
 from ...robots.description import Hull, RobotDescription
 from ...robots.shapes import surface
 from ...robots.surfaces import quaternion_from_z, robot_surfaces
-from ...runtime.language.errors import AloftError
+from ...runtime.language.errors import AloftError, pip_line
 from ...runtime.language.extensions import is_provided, missing_extension, provided
+from ...runtime.language.importing import without_imports
 from ..file.format import RecordedField, RecordedRows, nanoseconds
 from ..file.reader import RecordedRun
 from ..file.table import chosen
@@ -274,11 +275,9 @@ def export_mcap(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None
     try:
         from mcap.writer import Writer
     except ImportError:
-        raise ExportError(
-            "MCAP needs the library mcap; pip install 'aloft-robotics[mcap]'"
-        ) from None
+        raise ExportError(f"MCAP needs the library mcap; {pip_line('mcap')}") from None
     if find_spec("rosbags") is None:
-        raise ExportError("MCAP needs the library rosbags; pip install 'aloft-robotics[mcap]'")
+        raise ExportError(f"MCAP needs the library rosbags; {pip_line('mcap')}")
     ports: dict[str, list[RecordedField]] = {}
     for field in chosen(run, names):
         ports.setdefault(field.name.rpartition(".")[0], []).append(field)
@@ -316,7 +315,7 @@ def export_bag(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
         OSError: the folder cannot be written.
     """
     if find_spec("rosbags") is None:
-        raise ExportError("a bag needs the library rosbags; pip install 'aloft-robotics[mcap]'")
+        raise ExportError(f"a bag needs the library rosbags; {pip_line('mcap')}")
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -379,15 +378,20 @@ def export(kind: str, run: RecordedRun, path: Path, names: Sequence[str] = ()) -
         OSError: the file cannot be written.
     """
     if path.is_char_device() or path.is_fifo():  # such as /dev/stdout
-        EXPORTS[kind](run, path, names)
+        _write(kind, run, path, names)
         return
     folder = path.with_name(f"{path.name}.part")
     shutil.rmtree(folder, ignore_errors=True)  # of an export that was killed
     folder.mkdir()
     try:
-        EXPORTS[kind](run, folder / path.name, names)
+        _write(kind, run, folder / path.name, names)
         if path.is_dir():
             raise FileExistsError(EEXIST, "the folder is there already", str(path))
         os.replace(folder / path.name, path)
     finally:
         shutil.rmtree(folder)
+
+
+def _write(kind: str, run: RecordedRun, path: Path, names: Sequence[str]) -> None:
+    with without_imports():  # a robot may carry sensors of a module of the recording's
+        EXPORTS[kind](run, path, names)

@@ -9,6 +9,7 @@ graphs on.
 
 from __future__ import annotations
 
+import os
 import subprocess
 import zlib
 from base64 import b64decode, b64encode
@@ -16,6 +17,7 @@ from collections.abc import Iterator, Mapping
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from ...runtime.language.stages import CheckedGraph
@@ -82,8 +84,21 @@ def _contents(files: Mapping[str, Path]) -> Iterator[tuple[str, str]]:
 
 
 def unpacked(content: str) -> bytes:
-    """Unpack the bytes of a file from the text that ``contents`` made."""
-    return zlib.decompress(b64decode(content))
+    """Unpack the bytes of a file from the text that ``contents`` made.
+
+    Raises:
+        ValueError: it is not such a text, or it unpacks to more than ``MOST_BYTES``.
+    """
+    unpacker = zlib.decompressobj()
+    try:
+        data = unpacker.decompress(b64decode(content, validate=True), MOST_BYTES + 1)
+    except zlib.error as error:
+        raise ValueError(f"it cannot be unpacked ({error})") from error
+    if len(data) > MOST_BYTES:
+        raise ValueError(f"it unpacks to more than {MOST_BYTES >> 20} MiB")
+    if not unpacker.eof:
+        raise ValueError("it was cut off")
+    return data
 
 
 def other_files(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
@@ -113,17 +128,55 @@ def named_file(value: Any, folder: Path) -> Path | None:
 
 def project_state(folder: Path) -> str:
     """Return the commit of the project that ``folder`` is in, and whether files differ from it;
-    empty where it is no project under git."""
+    empty where it is no project under git.
+
+    A project's own settings may name programs that git runs when it compares files (a file system
+    monitor, filters, hooks). So git compares under settings of ours, which name none, and whose
+    folder has the project's commit; of the project only the index and the objects are read.
+    """
     try:
-        commit = _git(folder, "rev-parse", "HEAD")
-        changed = _git(folder, "status", "--porcelain", "--untracked-files=no")
-    except (OSError, subprocess.SubprocessError):
+        found = _git(
+            folder, {}, "rev-parse", "HEAD", "--show-toplevel", "--absolute-git-dir",
+            "--path-format=absolute", "--git-path", "objects", "--git-path", "index",
+        ).splitlines()  # fmt: skip
+        commit, top, _, objects, index = found
+    except (OSError, subprocess.SubprocessError, ValueError):
         return ""
+    try:
+        with TemporaryDirectory(prefix="aloft-git-") as ours:
+            _write_settings(Path(ours), commit)
+            places = {
+                "GIT_DIR": ours, "GIT_WORK_TREE": top, "GIT_OBJECT_DIRECTORY": objects,
+                "GIT_INDEX_FILE": index,
+            }  # fmt: skip
+            changed = _git(Path(top), places, "status", "--porcelain", *_OWN_FILES_ONLY)
+    except (OSError, subprocess.SubprocessError):
+        return f"{commit}, perhaps with changes"
     return f"{commit} with changes" if changed else commit
 
 
-def _git(folder: Path, *arguments: str) -> str:
+_OWN_FILES_ONLY = ("--untracked-files=no", "--ignore-submodules=all")
+"""A submodule has settings of its own, under which git would run in it."""
+
+
+def _write_settings(folder: Path, commit: str) -> None:
+    """Make a folder ``.git`` without any settings, in which this commit is checked out."""
+    for name in ("refs", "objects"):
+        (folder / name).mkdir()
+    (folder / "HEAD").write_text(f"{commit}\n", encoding="ascii")
+    wide = len(commit) == 64
+    version = "1\n[extensions]\n\tobjectformat = sha256" if wide else "0"
+    (folder / "config").write_text(
+        f"[core]\n\trepositoryformatversion = {version}\n", encoding="ascii"
+    )
+
+
+def _git(folder: Path, places: Mapping[str, str], *arguments: str) -> str:
     # without the index being written again: nobody's project is locked or changed by a run in it
     command = ["git", "--no-optional-locks", "-C", str(folder or "."), *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=2.0, check=True)
+    alone = {"GIT_CONFIG_NOSYSTEM": "1", "GIT_CONFIG_GLOBAL": os.devnull} if places else {}
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=2.0, check=True,
+        env={**os.environ, **alone, **places},
+    )  # fmt: skip
     return done.stdout.strip()

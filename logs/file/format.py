@@ -50,6 +50,8 @@ from ...robots.terrain import Ground, HeightField, Terrain
 from ...runtime.language.layout import Layout
 from ...runtime.language.signals import Slot
 
+MOST_OF_BUFFER = 1 << 30
+"""Bytes of a bus or a state, at most."""
 FORMAT = 5
 """The number of this format, the only one that is read."""
 SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
@@ -134,13 +136,18 @@ class RecordedLayout:
 
 @dataclass(frozen=True)
 class RecordedBlock:
-    """One block: its type as ``module:Class``, when it runs and the folder of its graph file."""
+    """One block: its type as ``module:Class``, when it runs and the folder of its graph file.
+
+    ``ports`` are those of a block that needs code which is not aloft's, as plain data, so that the graph can
+    be drawn without it; see ``header``.
+    """
 
     path: str
     type: str
     period_ticks: int
     offset_ticks: int
     folder: str
+    ports: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -207,6 +214,19 @@ class Header:
     def schema_hashes(self) -> dict[str, str]:
         """The schema hashes of the bus and of the state."""
         return {"bus": self.bus.schema_hash(), "state": self.state.schema_hash()}
+
+    def expect_possible(self) -> None:
+        """Check that every field lies in its buffer. Raises ``ValueError``."""
+        for layout, name in ((self.bus, "bus"), (self.state, "state")):
+            if not 0 <= layout.size <= MOST_OF_BUFFER:
+                raise ValueError(f"the {name} has {layout.size} bytes")
+            slots = layout.layout()
+            for each in layout.fields:
+                begin, end = slots.byte_range(each.name)
+                if not 0 <= begin <= end <= layout.size or min(each.shape, default=0) < 0:
+                    raise ValueError(f"the field {each.name} does not lie in the {name}")
+        if len(self.bus_start) not in (0, self.bus.size):
+            raise ValueError(f"the bus has {self.bus.size} bytes, not {len(self.bus_start)}")
 
     def to_json(self) -> str:
         """Write the header as JSON text."""

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import ctypes
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 from ...robots.terrain import Terrain, WorldParameters
+from ...runtime.language.block import Block, Port
 from ...runtime.language.layout import Layout
 from ...runtime.language.quantities import Quantity
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.stages import BlockSpec, CheckedGraph
 from ...runtime.running.memory import BoundGraph
+from .code import needs_code
 from .dependencies import contents, digests, files_read, parameter_files, project_state
 from .format import Header, RecordedBlock, RecordedField, RecordedLayout
 
@@ -54,6 +57,8 @@ def make_header(
 ) -> Header:
     """Make the header of a run of ``graph``; without ``state``, one that can hold no keyframes."""
     files = parameter_files(graph)
+    written = graph.resolved.blocks if graph.resolved is not None else ()
+    foreign = {block.path for block in written if needs_code(block, graph.robot)}
     return Header(
         name=graph.name,
         graph=graph.text,
@@ -73,7 +78,7 @@ def make_header(
         parameters=dict(_parameters(graph)),
         versions=versions(),
         machine=machine(),
-        blocks=tuple(_block(spec) for spec in graph.blocks),
+        blocks=tuple(_block(spec, foreign) for spec in graph.blocks),
         order=graph.order,
         robot=graph.robot,
         terrain=terrain_of(graph),
@@ -90,9 +95,48 @@ def terrain_of(graph: CheckedGraph) -> Terrain | None:
     return next((params.build_scene(graph.robot) for params in scenes), None)
 
 
-def _block(spec: BlockSpec) -> RecordedBlock:
+def _block(spec: BlockSpec, foreign: Container[str]) -> RecordedBlock:
+    """Return a block as it is recorded; ``foreign`` are the paths of those that need code of others."""
     kind = f"{spec.block_type.__module__}:{spec.block_type.__qualname__}"
-    return RecordedBlock(spec.path, kind, spec.period_ticks, spec.offset_ticks, str(spec.folder))
+    ports = _ports(spec) if spec.path in foreign else None
+    times = spec.period_ticks, spec.offset_ticks
+    return RecordedBlock(spec.path, kind, *times, str(spec.folder), ports)
+
+
+def _ports(spec: BlockSpec) -> dict[str, Any]:
+    """Return all that is drawn of a block, as plain data: its ports with their fields."""
+    # a block that works in the background is recorded as what it is there
+    kind: type[Block] = getattr(spec.block_type, "_block_type", spec.block_type)
+    return {
+        "text": kind.__doc__ or "",
+        "moore": kind.is_moore(),
+        "outside": kind.outside,
+        "inputs": {
+            name: _port(spec, name, port) | {"optional": port.optional, "truth": port.reads_truth}
+            for name, port in kind.inputs.items()
+        },
+        "outputs": {
+            name: _port(spec, name, port) | {"truth": port.truth, "absent": port.absent}
+            for name, port in kind.outputs.items()
+        },
+        "states": {name: _port(spec, name, port) for name, port in kind.states.items()},
+    }
+
+
+def _port(spec: BlockSpec, name: str, port: Port[Any]) -> dict[str, Any]:
+    signal, fields = port.signal, {}
+    for key, field in signal.fields.items():
+        quantity = spec.quantities.get(f"{name}.{key}") or Quantity(field.unit, field.frame)
+        sizes = [spec.dimensions.get(str(s), s) for s in field.shape]
+        fields[key] = {
+            "shape": sizes,
+            "dtype": field.dtype_name,
+            "unit": None if quantity.unit is None else str(quantity.unit),
+            "frame": quantity.frame,
+            "text": field.text,
+            "values": {int(v): v.name.lower() for v in field.values or ()},
+        }
+    return {"signals": _names(signal), "text": port.text, "fields": fields}
 
 
 def _parameters(graph: CheckedGraph) -> Iterator[tuple[str, float | str]]:

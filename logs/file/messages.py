@@ -39,6 +39,8 @@ CLOSING = HEAD.pack(END, 0)
 ARROW = 2
 """The kind of a message that holds an Arrow table."""
 _LAST_KIND = 3
+MOST_RATIO = 255
+"""Bytes that LZ4 can make of one."""
 _KEY = b"\x82\xf4\x03\x2c"
 """The protobuf field 8000, 44 bytes long."""
 _MARK = _KEY + b"aloft-seal\x01"
@@ -365,6 +367,8 @@ def table_of(body: bytes) -> tuple[str, Any]:
         parts = dict(protobuf.fields(body))
         data: Any = parts[5]
         if parts.get(2) == 2:
+            if not 0 <= parts[3] <= MOST_RATIO * (len(data) + 1):
+                raise ValueError(f"{len(data)} bytes cannot unpack to {parts[3]}")
             data = pa.decompress(data, parts[3], codec="lz4_raw")
         with pa.ipc.open_stream(data) as reader:
             batch = reader.read_next_batch()

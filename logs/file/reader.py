@@ -104,6 +104,10 @@ class PackedRows:
         try:
             packed = batch[f"aloft:{PACKED}"][row].values.to_numpy().tobytes()
             first, rows = unpack(packed) if part is None else unpack_bytes(packed, *part)
+            if self._found.sealed and (first, len(rows)) != (
+                message.first, message.last + 1 - message.first,
+            ):  # fmt: skip
+                raise ValueError("these rows are not of the ticks that their seal names")
             if part is None and rows.shape[1] != self._header.bus.size:
                 raise ValueError("these rows belong to another layout")
         except (ValueError, KeyError) as error:
@@ -113,6 +117,12 @@ class PackedRows:
     @cached_property
     def ticks(self) -> NDArray[np.int64]:
         """The recorded ticks in order, (ticks,)."""
+        count = sum(m.last + 1 - m.first for m in self._pieces)
+        if any(m.last < m.first for m in self._pieces) or count > MOST_TICKS * len(self._pieces):
+            raise RecordingError(
+                f"{self._found.path} says that {len(self._pieces)} messages hold {count} ticks; the "
+                f"expected number is {MOST_TICKS} in each at most"
+            )
         found = [np.arange(m.first, m.last + 1, dtype=np.int64) for m in self._pieces]
         return np.unique(np.concatenate([np.zeros(0, np.int64), *found]))
 
@@ -141,6 +151,12 @@ class PackedRows:
         """Unpack the rows of all ticks, (ticks, bytes), or of each row the bytes ``part`` only."""
         ticks = self.ticks
         size = self._header.bus.size if part is None else part[1] - part[0]
+        whole = len(ticks) * size
+        if whole > max(MOST_KEPT, LIKELY_RATIO * self._found.size):
+            raise RecordingError(
+                f"{self._found.path} has {self._found.size} bytes and would unpack to {whole}, which "
+                "no recording of a run does; read it with pieces() or window() if it is yours"
+            )
         rows = np.empty((len(ticks), size), np.uint8)
 
         def unpack_one(piece: _PackedPiece) -> None:
@@ -162,6 +178,11 @@ READ_ALONE = 3
 reading of everything is faster then."""
 MOST_KEPT = 2 << 30
 """The bytes of all rows, at most, that are then kept in memory."""
+LIKELY_RATIO = 200
+"""Bytes of rows that a recording's byte stands for, at most, where it is a large one; of the shipped graphs
+it is three."""
+MOST_TICKS = 1 << 16
+"""Ticks that are packed together, at most; a writer of aloft packs 512."""
 
 
 @dataclass(frozen=True)
@@ -389,8 +410,13 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
     ]
     outcome = json.loads(texts["outcome"]) if "outcome" in texts else None
     ordered = tuple(note for _, note in sorted(notes, key=lambda entry: entry[0]))
-    header = Header.from_json(texts["header"])
-    header = replace(header, contents=json.loads(texts.get("contents", "{}")))
+    try:
+        header = Header.from_json(texts["header"])
+        header = replace(header, contents=json.loads(texts.get("contents", "{}")))
+        header.expect_possible()
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        reason = " ".join(str(error).split())
+        raise RecordingError(f"{path} has a header that aloft does not write: {reason}") from error
     return RecordedRun(path, header, outcome, ordered, found)
 
 

@@ -27,6 +27,10 @@ LEVEL = 3
 _HEAD = Struct("<4sIIqI")
 """A mark, the number of ticks, the bytes of a row, the first tick, and the CRC-32 of the rows."""
 _MARK = b"rowp"
+MOST_BYTES = 1 << 26
+"""Bytes of the rows that are packed together, but that one row may have more."""
+MOST_OF_ROW = 1 << 30
+"""Bytes of a row that is read."""
 _SIZES = Struct("<II")
 """Behind the head: the number of columns that change, and the bytes before compression."""
 
@@ -86,6 +90,11 @@ def _head(data: bytes) -> tuple[bytes, int, int, int, int]:
     if len(data) < _HEAD.size + _SIZES.size or data[:4] != _MARK:
         raise ValueError("these bytes are no packed rows")
     mark, count, size, first, crc = _HEAD.unpack_from(data)
+    if size > MOST_OF_ROW or count * size > max(MOST_BYTES, size):
+        raise ValueError(
+            f"{count} packed rows of {size} bytes are more than the {max(MOST_BYTES, size)} bytes "
+            "that are ever packed together"
+        )
     return mark, count, size, first, crc
 
 
@@ -104,11 +113,11 @@ def _words(data: bytes, begin: int, end: int) -> NDArray[np.uint8]:
     bytes)."""
     _, count, size, _, _ = _head(data)
     changes, length = _SIZES.unpack_from(data, _HEAD.size)
-    flat = _decompressed(data[_HEAD.size + _SIZES.size :], length)
     width = -(-size // 8)
     sizes = (-(-width // 8), 8 * (width - changes), 8 * changes * count)
     if changes > width or sum(sizes) != length:
         raise ValueError("packed rows have not the size that they say")
+    flat = _decompressed(data[_HEAD.size + _SIZES.size :], length)
     places = np.cumsum((0, *sizes)).tolist()
     mask, constant, planes = (
         np.frombuffer(flat, np.uint8, size, place)

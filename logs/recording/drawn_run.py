@@ -13,6 +13,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from ...runtime.language.importing import without_imports
 from ..file.format import DIAGRAM
 from ..file.reader import RecordedRun
 from ..viewing.blueprint import recording_blueprint
@@ -61,13 +62,14 @@ def write_picture(stream: Any, diagram: bytes) -> None:
 
 def draw(out: RunStream, run: RecordedRun) -> None:
     """Draw a whole run into a stream."""
-    out.write_start()
-    for batch in run.batches(DRAWN_TICKS):
-        out.write_rows(batch.ticks, batch.rows)
-    out.write_rest()
-    out.write_notes(run.notes)
-    if run.outcome is not None:
-        out.write_times(dict(run.outcome))
+    with without_imports():  # a sensor of a user's own module is not drawn
+        out.write_start()
+        for batch in run.batches(DRAWN_TICKS):
+            out.write_rows(batch.ticks, batch.rows)
+        out.write_rest()
+        out.write_notes(run.notes)
+        if run.outcome is not None:
+            out.write_times(dict(run.outcome))
 
 
 def write_comparison(path: str | PathLike[str], first: RecordedRun, second: RecordedRun) -> Path:

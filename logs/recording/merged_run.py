@@ -21,9 +21,10 @@ from ...runtime.links.lockstep_link import LinkInput
 from ...runtime.links.part import MergedLayout
 from ...runtime.links.path_ages import MAX_TICKS, check_path_ages, timeline_of
 from ...runtime.placement.placed import PlacedGraph
-from ...runtime.running.memory import BoundGraph, Memory, Snapshot
+from ...runtime.running.memory import Memory, Snapshot
 from ...runtime.running.sink import Note
-from ..file.header import header_of
+from ..file.format import Header, RecordedBlock
+from ..file.header import make_header
 from ..file.reader import RecordedRun, read
 from .writer import RecordingWriter
 
@@ -144,7 +145,6 @@ def run_hash_of(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> tuple[
 def merge_recordings(
     path: str | PathLike[str],
     placed: PlacedGraph,
-    bound: BoundGraph,
     parts: Mapping[str, RecordedRun],
     outcome: dict[str, Any],
 ) -> Path:
@@ -153,7 +153,6 @@ def merge_recordings(
     Args:
         path: the file; one that is there is replaced.
         placed: the graph as it was spread.
-        bound: the same graph, bound in one process and not run.
         parts: what each machine has recorded.
         outcome: of the whole run, as ``RunResult.to_json`` gives it.
 
@@ -164,19 +163,57 @@ def merge_recordings(
         OSError: the file cannot be written.
         ImportError: Rerun is not installed.
     """
-    first = next(iter(parts.values())).header
-    header = replace(header_of(bound), first_tick=first.first_tick, clock=first.clock)
+    memory = Memory(placed.graph.blocks, placed.graph.robot)
+    header = _whole_header(placed, memory, parts)
     writer = RecordingWriter(path, header, outcome["run_hash"])
     try:
         for ticks, rows in _pieces(placed, parts):
             writer.write_rows(ticks, rows)
-        for snapshot in _keyframes(placed, bound, parts):
+        for snapshot in _keyframes(placed, memory, parts):
             writer.write_keyframe(snapshot)
         writer.write_notes(_notes(parts))
         writer.write_outcome(outcome)
     finally:
         writer.close()
     return writer.path
+
+
+def joined_blocks(parts: Sequence[RecordedRun]) -> tuple[RecordedBlock, ...]:
+    """Return every block as the part recorded it that ran it, not as what stood for it elsewhere."""
+    found: dict[str, RecordedBlock] = {}
+    for part in parts:
+        for block in part.header.blocks:
+            if block.path not in found or _STAND_IN in found[block.path].type:
+                found[block.path] = block
+    return tuple(found.values())
+
+
+def _whole_header(placed: PlacedGraph, memory: Memory, parts: Mapping[str, RecordedRun]) -> Header:
+    """Return the header of the whole: what the parts say, for the memory of one process."""
+    graph, first = placed.graph, next(iter(parts.values())).header
+    headers = [part.header for part in parts.values()]
+    starts = {
+        machine: np.frombuffer(part.header.bus_start, np.uint8)[None]
+        for machine, part in parts.items()
+    }
+    start = _whole_bus(placed, parts).rows(starts).tobytes()
+    made = make_header(graph, memory.bus.layout, start, state=memory.state.layout)
+    recorded = {block.path: block for block in joined_blocks(list(parts.values()))}
+    return replace(
+        made,
+        graph=first.graph,
+        first_tick=first.first_tick,
+        clock=first.clock,
+        blocks=tuple(
+            replace(recorded.get(block.path, block), folder=block.folder) for block in made.blocks
+        ),
+        **{
+            name: {key: value for each in headers for key, value in getattr(each, name).items()}
+            for name in ("seeds", "parameters", "files", "contents")
+        },
+        source=first.source,
+        project=first.project,
+    )  # fmt: skip
 
 
 def _pieces(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> Any:
@@ -196,12 +233,12 @@ def _pieces(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> Any:
 
 
 def _keyframes(
-    placed: PlacedGraph, bound: BoundGraph, parts: Mapping[str, RecordedRun]
+    placed: PlacedGraph, memory: Memory, parts: Mapping[str, RecordedRun]
 ) -> Sequence[Snapshot]:
     """Join the keyframes of the whole, before those ticks for which every part has one."""
     bus = _whole_bus(placed, parts)
     state = MergedLayout(
-        placed, bound.memory.state.layout, {m: p.header.state.layout() for m, p in parts.items()}
+        placed, memory.state.layout, {m: p.header.state.layout() for m, p in parts.items()}
     )
     first, *others = (part.keyframes for part in parts.values())
     made = []

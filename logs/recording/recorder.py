@@ -26,6 +26,7 @@ from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.running.memory import BoundGraph
 from ...runtime.running.run_result import RunResult
 from ...runtime.running.sink import Note, Sink, parameter_note
+from ..file.code import code_of, remember
 from ..file.header import header_of
 from ..file.reader import read
 from .output_file import cause_of, remedy, replaced, reserve_output, unfinished_name
@@ -171,6 +172,9 @@ class Recorder(Sink):
             return "Rerun cannot be imported", "pip install rerun-sdk, or --no-record writes none"
         rate, frame = self._bound.graph.base_rate, 4 * space_of(len(self._frame))
         capacity = round(self._ring_time * rate) * space_of(len(self._bus)) + frame
+        graph = self._bound.graph
+        if graph.resolved is not None:
+            remember(code_of(graph.resolved, graph.robot))  # what the user runs he may run again
         header = header_of(self._bound).to_json()
         try:
             output = None

@@ -50,6 +50,8 @@ DRAWN_TICKS, DRAWN_BYTES = 4096, 1 << 25
 """Ticks that are drawn at once and their bytes, at most: the viewer likes few large pieces."""
 ROWS_AT_ONCE = 512
 """Ticks that are packed together, at most."""
+PACKED_BYTES = 1 << 25
+"""Bytes of the rows that are packed together, at most, but that one row may have more."""
 LEAST_ROWS = 16
 """Ticks that are not packed in smaller pieces on a disk that is nearly full."""
 
@@ -126,8 +128,9 @@ class RecordingWriter:
         The rows are copied; curves and the robot in 3D are drawn of several thousand at once.
         """
         for first, last in spans(ticks) if len(ticks) else ():
-            for begin in range(int(first), int(last) + 1, ROWS_AT_ONCE):
-                end = min(begin + ROWS_AT_ONCE, int(last) + 1)
+            most = min(ROWS_AT_ONCE, max(1, PACKED_BYTES // max(1, rows.shape[1])))
+            for begin in range(int(first), int(last) + 1, most):
+                end = min(begin + most, int(last) + 1)
                 start = int(np.searchsorted(ticks, begin))
                 self._write_packed(begin, rows[start : start + end - begin])
         if len(ticks):

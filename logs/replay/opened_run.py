@@ -21,7 +21,9 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from ...files.names import inside
 from ...files.nodes import plain
+from ...files.problems import Problems
 from ...robots.description import RobotDescription, RobotError, find_robot
 from ...runtime.language.errors import AloftError, ExitCode
 from ...runtime.language.flat_graph import FlatGraph
@@ -29,13 +31,16 @@ from ...runtime.language.layout import Layout
 from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.loading import checked_again, flattened_text
+from ...runtime.loading.flattening.change import change
 from ...runtime.running.memory import BoundGraph, Snapshot
+from ..file.code import Code, code_of, expect_trusted, remember
 from ..file.dependencies import digests, files_read, named_file, other_files, unpacked
 from ..file.format import Header
 from ..file.header import machine, versions
 from ..file.reader import RecordedRun, read
 from ..viewing.signal_names import value_text
 from .replay import late_blocks
+from .stand_in import seen_graph
 
 _ENTRY = re.compile(r"(?P<block>[^:/]+)\.(?P<parameter>\w+)(?P<kind>: |/)(?P<name>.*)", re.DOTALL)
 
@@ -65,17 +70,22 @@ def restored(header: Header, graph: FlatGraph, folder: Path) -> Restored:
     """
     overrides: dict[str, str] = {}
     said, entries = [], set()
-    for entry, block, parameter, kind, name in _entries(header):
-        content = unpacked(header.contents[header.files[entry]])
+    places: dict[tuple[str, str], Path] = {}
+    for number, (entry, block, parameter, kind, name) in enumerate(_entries(header)):
+        try:
+            content = unpacked(header.contents[header.files[entry]])
+        except ValueError as error:
+            raise AloftError(f"the recording's file of {entry} cannot be used: {error}") from error
         found_in_folder = kind == "/"
         now = named_file(name, graph.folder)
         if now is not None and sha256(now.read_bytes()).hexdigest() == header.files[entry]:
             continue
-        place = folder / f"{block}.{parameter}"
-        _write(place / Path(name).name, content)
-        overrides[f"{block}.{parameter}"] = str(
-            place if found_in_folder else place / Path(name).name
-        )
+        place = folder / f"file{number}"
+        if found_in_folder:  # further files that the block found lie beside it
+            place = places.setdefault((block, parameter), place)
+        file = inside(place, Path(name).name)
+        _write(file, content)
+        overrides[f"{block}.{parameter}"] = str(place if found_in_folder else file)
         entries.add(entry)
         if found_in_folder:
             said.append(f"the file {name} of {block} is taken from the recording")
@@ -84,7 +94,7 @@ def restored(header: Header, graph: FlatGraph, folder: Path) -> Restored:
         said.append(f"the file of {entry} {why}; the recorded one is used")
     robot = header.robot
     if robot is not None and graph.robot is not None and not _is_present(robot, graph):
-        place = folder / f"{robot.name}.yaml"
+        place = folder / "robot.yaml"
         _write(place, yaml.safe_dump(robot.content(), sort_keys=False).encode())
         overrides["robot"] = str(place)
         said.append(
@@ -128,11 +138,16 @@ class OpenedRun:
         file: the recording.
         folder: the folder of the graph file, to which file names in the graph are relative.
         restore: whether files that have changed or gone since are taken from the recording.
+        look: whether the graph is only looked at: no code that the recording names is run, and blocks that
+            need such code are stand-ins.
+        trust: whether the user allows all code that the recording names, from now on.
     """
 
     file: RecordedRun
     folder: Path
     restore: bool = True
+    look: bool = False
+    trust: bool = False
     _place: TemporaryDirectory[str] = field(
         default_factory=lambda: TemporaryDirectory(prefix="aloft-replay-"),
         repr=False,
@@ -141,8 +156,9 @@ class OpenedRun:
 
     @classmethod
     def of(
-        cls, path: str | PathLike[str], folder: Path | None = None, *, restore: bool = True
-    ) -> OpenedRun:
+        cls, path: str | PathLike[str], folder: Path | None = None, *, restore: bool = True,
+        look: bool = False, trust: bool = False,
+    ) -> OpenedRun:  # fmt: skip
         """Open the recording at ``path``.
 
         Raises:
@@ -152,7 +168,8 @@ class OpenedRun:
         file = read(path)
         if not len(file.ticks):
             raise AloftError(f"{path} holds no tick")
-        return cls(file, folder or _folder(Path(path), Path(file.header.source)), restore)
+        folder = folder or _folder(Path(path), Path(file.header.source))
+        return cls(file, folder, restore, look, trust)
 
     @cached_property
     def flat(self) -> FlatGraph:
@@ -169,14 +186,33 @@ class OpenedRun:
         return restored(self.file.header, self.flat, Path(self._place.name))
 
     def changed(self, overrides: Sequence[str] = ()) -> CheckedGraph:
-        """Return the recorded graph with further overrides. Raises ``LoadError``."""
+        """Return the recorded graph with further overrides.
+
+        Raises:
+            LoadError: the graph cannot be loaded any more.
+            UntrustedCodeError: it would run code of others that the user has not allowed.
+        """
         changed = [text.partition("=")[0] for text in overrides]
         files = [
             f"{key}={json.dumps(file)}"
             for key, file in self.restored.overrides.items()
             if key not in changed and f"{key.rpartition('.')[0]}.use" not in changed
         ]
+        if self.look:
+            return seen_graph(self.flat, self.file.header, files, overrides)
+        self._expect_trust(files)
         return checked_again(self.flat, [*files, *overrides])
+
+    def _expect_trust(self, files: Sequence[str]) -> None:
+        """Raise unless all code is trusted that the graph with these overrides of files runs."""
+        codes = self.code(files)
+        if self.trust:
+            remember(codes)
+        expect_trusted(codes if not self.trust else (), self.file.path)
+
+    def code(self, files: Sequence[str] = ()) -> list[Code]:
+        """Return the code that is not aloft's which the recorded graph runs."""
+        return code_of(change(self.flat, files, Problems()), self.file.header.robot)
 
     @cached_property
     def graph(self) -> CheckedGraph:

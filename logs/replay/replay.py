@@ -9,6 +9,9 @@ are fed from the recording:
   repeated on its recorded sensor readings;
 * only some changed blocks run. This shows what they would have done in the recorded situation; their
   outputs do not act on the recorded run.
+
+Nothing outside is touched in any of them: blocks whose outputs come from the real world, and those that act on it
+(``Block.acts_outside``), never run.
 """
 
 from __future__ import annotations
@@ -24,7 +27,8 @@ from numpy.typing import NDArray
 from ...runtime.language.errors import AloftError
 from ...runtime.language.layout import Layout
 from ...runtime.language.parameter_change import ParameterChange
-from ...runtime.language.stages import CheckedGraph, ClockSpec
+from ...runtime.language.registry import block_name
+from ...runtime.language.stages import BlockSpec, CheckedGraph, ClockSpec
 from ...runtime.loading.checking.parameters import adjust
 from ...runtime.running.differences import Comparison, Difference, Translation
 from ...runtime.running.executor import Executor
@@ -247,7 +251,8 @@ def replay(
         sinks: further sinks of the run.
 
     Raises:
-        ReplayError: there is no such block or no such tick, or ticks are missing.
+        ReplayError: there is no such block or no such tick, ticks are missing, or a block is to run that acts
+            outside.
         RunError: a block could not be set up.
     """
     graph = graph or recorded.graph
@@ -298,13 +303,24 @@ def _fed(
         for path in run:
             if path not in paths:
                 raise ReplayError(f"there is no block {path!r}; there is {', '.join(paths)}")
+        for path in run:
+            if is_outside(graph.block(path)):
+                raise ReplayError(
+                    f"{path} ({block_name(graph.block(path).block_type)}) acts outside of the graph, and a "
+                    "replay touches nothing there; replay another block"
+                )
         return [path for path in paths if path not in run]
     recorded = inputs == "recorded"
     return [
         spec.path
         for spec in graph.blocks
-        if spec.path in late or (recorded and spec.block_type.outside != "no")
+        if spec.path in late or is_outside(spec) or (recorded and spec.block_type.outside != "no")
     ]
+
+
+def is_outside(spec: BlockSpec) -> bool:
+    """Return whether a block reaches beyond the run: robots, pads, networks, other processes."""
+    return spec.block_type.outside == "real" or spec.block_type.acts_outside
 
 
 def _beginning(recorded: Replayable, first_tick: int | None) -> Snapshot | None:

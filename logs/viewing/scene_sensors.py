@@ -6,9 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ...hal.sensors.sensor import MountedSensor, SensorError, mounted_sensors
+from ...hal.sensors.sensor import MountedSensor, mounted_sensors
 from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
+from ...runtime.language.errors import AloftError
 from .contacts import ARROW_RADIUS, force_arrows
 from .drawing import Moments, SceneDisplay
 from .scene_ports import Ports, ports_of
@@ -22,7 +23,7 @@ def sensor_ports(robot: RobotDescription, ports: Ports) -> dict[str, MountedSens
     """
     try:
         sensors = mounted_sensors(robot)
-    except (SensorError, ImportError):
+    except (AloftError, ImportError):
         return {}
     return {
         port: sensor

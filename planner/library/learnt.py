@@ -2,7 +2,7 @@
 
 After each jump the recording says how far it landed from its place, and how the torso tilted. From this
 follows the correction of velocity and angular momentum at lift-off that this jump would have needed
-(``studies/jump_learning``): a ``Lesson``. The correction of the next jump is the mean of a Gaussian
+(``studies/rehearsing/learning``): a ``Lesson``. The correction of the next jump is the mean of a Gaussian
 process through all lessons, over what the jump is to do at lift-off, its ``Launch``. So a jump profits
 most from the last ones like it, and a new one from all that are near it::
 
@@ -43,7 +43,7 @@ MOST = 40
 """Lessons that are kept, the last ones."""
 LARGEST = 0.15
 """The largest correction of a lesson along each axis [m/s]; of the angular momentum this speed at the
-lever of ``studies/rehearsal``."""
+lever of ``studies/rehearsing/lift_off``."""
 TURNING_ARM = 0.1
 """A turn of the whole robot differs from none as this arm's speed does [m]."""
 

@@ -29,6 +29,10 @@ COARSER = 1.15
 """Least factor by which the cells grow from one try to the next."""
 _PLACES = np.array([1 << 40, 1 << 20, 1])
 """Factors that make one number of the three of a cell."""
+MOST_BYTES = 1 << 28
+"""Largest file that is read as a mesh."""
+MOST_READ = 4_000_000
+"""Triangles of a mesh that is read; a COLLADA file of some lines may ask for 10^9."""
 
 
 def mesh_triangles(path: Path) -> Array:
@@ -36,10 +40,12 @@ def mesh_triangles(path: Path) -> Array:
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: it is no mesh of a format that is read here.
+        ValueError: it is no mesh of a format that is read here, or has too many triangles.
     """
     kind = path.suffix.lower()
     try:
+        if not path.is_file() or path.stat().st_size > MOST_BYTES:
+            raise ValueError(f"no file, or one of more than {MOST_BYTES >> 20} MiB")
         if kind == ".stl":
             triangles = stl_corners(path.read_bytes()).reshape(-1, 3, 3)
         elif kind == ".obj":
@@ -48,11 +54,17 @@ def mesh_triangles(path: Path) -> Array:
             triangles = collada_triangles(path.read_bytes())
         else:
             raise ValueError(f"no mesh of the formats {', '.join(READABLE)}")
+        if len(triangles) > MOST_READ:
+            raise ValueError(_too_many(len(triangles)))
         if not len(triangles) or not np.isfinite(triangles).all():
             raise ValueError(f"a mesh of {len(triangles)} triangles, or not all are finite")
     except (ValueError, IndexError, KeyError) as error:
         raise ValueError(f"{path}: {error}") from error
     return triangles
+
+
+def _too_many(count: int) -> str:
+    return f"a mesh of {count} triangles; expected {MOST_READ} at most, make it coarser"
 
 
 def _obj_triangles(text: str) -> Array:
@@ -122,6 +134,8 @@ def stl_corners(content: bytes) -> Array:
 Element = ElementTree.Element
 DEEPEST = 32
 """Nodes inside nodes that are followed; a file may name a node within itself."""
+MOST_NODES = 100_000
+"""Nodes of a file that are followed in all."""
 
 
 def collada_triangles(content: bytes) -> Array:
@@ -140,20 +154,37 @@ def collada_triangles(content: bytes) -> Array:
     metre = float(unit.get("meter", "1")) if unit is not None else 1.0
     named = {e.get("id", ""): e for e in root.iter() if e.get("id")}
     shapes: dict[str, Array] = {}
-    found = [
-        triangles
-        for scene in root.iter()
-        if _tag(scene) == "visual_scene"
-        for node in _children(scene, "node")
-        for triangles in _of_node(node, np.eye(4), named, shapes, 0)
-    ]
+    scenes = (scene for scene in root.iter() if _tag(scene) == "visual_scene")
+    nodes = (node for scene in scenes for node in _children(scene, "node"))
+    found, count, visits = [], 0, Visits()
+    for node in nodes:
+        for triangles in _of_node(node, np.eye(4), named, shapes, visits, 0):
+            count += len(triangles)
+            if count > MOST_READ:
+                raise ValueError(_too_many(count))
+            found.append(triangles)
     return metre * np.concatenate([np.zeros((0, 3, 3)), *found])
 
 
+class Visits:
+    """Counts the nodes that were followed: one of few lines may name another 10^9 times."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def add(self) -> None:
+        """Count one more. Raises ``ValueError`` from ``MOST_NODES`` on."""
+        self.count += 1
+        if self.count > MOST_NODES:
+            raise ValueError(f"more than {MOST_NODES} nodes in one another")
+
+
 def _of_node(
-    node: Element, above: Array, named: dict[str, Element], shapes: dict[str, Array], depth: int
-) -> Iterator[Array]:
+    node: Element, above: Array, named: dict[str, Element], shapes: dict[str, Array],
+    visits: Visits, depth: int,
+) -> Iterator[Array]:  # fmt: skip
     """Yield the triangles of a node and those within, in the scene's frame; ``above`` (4, 4) leads there."""
+    visits.add()
     if depth > DEEPEST:
         raise ValueError("nodes are too deep in one another")
     pose = above.copy()
@@ -166,9 +197,9 @@ def _of_node(
         yield shapes[name] @ pose[:3, :3].T + pose[:3, 3]
     for each in _children(node, "instance_node"):
         inner = named[each.get("url", "").removeprefix("#")]
-        yield from _of_node(inner, pose, named, shapes, depth + 1)
+        yield from _of_node(inner, pose, named, shapes, visits, depth + 1)
     for inner in _children(node, "node"):
-        yield from _of_node(inner, pose, named, shapes, depth + 1)
+        yield from _of_node(inner, pose, named, shapes, visits, depth + 1)
 
 
 def _transform(element: Element) -> Array:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 _PORTS = ("Input", "Output")
 _MACHINE = ("step", "emit")
+_PACKAGE = Path(__file__).parents[2]
 _MOST_FILES = 300
 """Largest number of files of a user's folder that are read in order to propose names."""
 
@@ -135,3 +136,26 @@ def _last_name(node: ast.expr) -> str:
     if isinstance(node, ast.Attribute):
         return node.attr
     return node.id if isinstance(node, ast.Name) else ""
+
+
+def imported_files(file: Path, root: Path) -> Iterator[Path]:
+    """Yield the files below ``root`` that a module imports, with the packages they are in."""
+    try:
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+    except (OSError, SyntaxError, ValueError, RecursionError):
+        return
+    for node in ast.walk(tree):
+        names: list[str] = []
+        base = root
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = file.parents[node.level - 1] if node.level else root
+            module = node.module or ""
+            names = [module, *(f"{module}.{alias.name}".strip(".") for alias in node.names)]
+        for name in filter(None, names):
+            parts = name.split(".")
+            places = [base.joinpath(*parts[:k], "__init__.py") for k in range(1, len(parts) + 1)]
+            for place in (*places, base.joinpath(*parts).with_suffix(".py")):
+                if place.is_file() and place.is_relative_to(root) and _PACKAGE not in place.parents:
+                    yield place

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import importlib
+import importlib.machinery
 import importlib.util
 import linecache
 import sys
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from types import ModuleType
 
@@ -26,15 +29,42 @@ class UnknownModuleError(UnknownBlockError):
     """There is no such module."""
 
 
+class NotImportedError(UnknownBlockError):
+    """A user's module was needed where none is imported; see ``without_imports``."""
+
+
+NOT_IMPORTED = "is not imported to look at a file"
+"""The words by which this error is known where only its text is left."""
+_ALLOWED: ContextVar[bool] = ContextVar("imports of users' modules", default=True)
+
+
+@contextmanager
+def without_imports() -> Iterator[None]:
+    """Import no module that a file names, as long as this lasts: looking at a file never runs its code."""
+    token = _ALLOWED.set(False)
+    try:
+        yield
+    finally:
+        _ALLOWED.reset(token)
+
+
+def is_importing() -> bool:
+    """Return whether modules that files name are imported now."""
+    return _ALLOWED.get()
+
+
 def user_module(module_name: str, folders: Iterable[Path]) -> ModuleType:
     """Import a module from the first of some folders that has it, or else as an installed module.
 
     Raises:
+        NotImportedError: no module of a user is imported now.
         UnknownBlockError: there is no such module, or the name cannot be one.
         BlockImportError: it fails when it is imported.
     """
     if not module_name or not all(part.isidentifier() for part in module_name.split(".")):
         raise UnknownBlockError(f"{module_name!r} is not the name of a module")
+    if not _ALLOWED.get():
+        raise NotImportedError(f"the module {module_name!r} {NOT_IMPORTED}")
     for folder in dict.fromkeys(folder.resolve() for folder in folders):
         file = _file_of(module_name, folder)
         if file is not None:
@@ -86,6 +116,26 @@ def import_module(module_name: str) -> ModuleType:
         return importlib.import_module(module_name)
     except (Exception, SystemExit) as error:  # whatever a user's module may raise
         raise _import_error(module_name, error) from error
+
+
+def find_source(module_name: str, folders: Iterable[Path]) -> Path | None:
+    """Find the file that ``user_module`` would import, and import nothing; ``None``: there is none."""
+    if not all(part.isidentifier() for part in module_name.split(".")):
+        return None
+    own = (_file_of(module_name, folder.resolve()) for folder in dict.fromkeys(folders))
+    file = next((file for file in own if file is not None), None)
+    if file is not None:
+        return file
+    known = getattr(sys.modules.get(module_name), "__file__", None)
+    if known:
+        return Path(known)
+    top, _, rest = module_name.partition(".")
+    spec = importlib.machinery.PathFinder.find_spec(top)
+    if spec is None or not rest:
+        return Path(spec.origin) if spec is not None and spec.origin else None
+    within = (Path(place) for place in spec.submodule_search_locations or ())
+    found = (_file_of(rest, place) for place in within)
+    return next((file for file in found if file is not None), None)
 
 
 def _file_of(module_name: str, folder: Path) -> Path | None:

@@ -102,6 +102,15 @@ class BlockHooks(RuntimeBlock):
     same outputs again when it is run again; the real world (a robot, another machine) does not, so
     a replay takes its outputs from the recording."""
 
+    acts_outside: ClassVar[bool] = False
+    """True if the block sends to something outside of the run, such as a network, another process or a
+    device. A replay and what goes on from a recording never run such a block, nor one whose outputs come
+    from the real world: its outputs are the recorded ones."""
+
+    program_files: ClassVar[tuple[str, ...]] = ()
+    """The parameters that name a program to run, such as an FMU, or a folder with one. A recording's
+    program runs only if the user trusts it."""
+
     delay_runs: ClassVar[int] = 1
     """After how many runs the outputs of a Moore block depend on what it reads."""
 

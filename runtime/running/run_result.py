@@ -17,6 +17,7 @@ from ..language.errors import ExitCode, RunError
 from ..language.layout import only_field
 from ..language.parameter_change import ParameterChange
 from ..language.stages import CheckedGraph
+from .lateness import TickLateness
 from .sinks import MemoryLog
 from .timing import BlockTimes
 
@@ -48,7 +49,10 @@ class RunResult:
     metrics: Mapping[str, Metric] = field(default_factory=dict)
     blocks: Mapping[str, BlockTimes] = field(default_factory=dict)
     overruns: int = 0
+    """Ticks that began too late; see ``ClockSpec.late_after``."""
     skipped_periods: int = 0
+    lateness: TickLateness | None = None
+    """How late ticks began; ``None`` for a run that goes as fast as it can."""
     error: RunError | None = None
     stop_problems: tuple[str, ...] = ()
     block_warnings: tuple[str, ...] = ()
@@ -158,6 +162,7 @@ class RunResult:
             "wall_time_s": self.wall_time_s,
             "overruns": self.overruns,
             "skipped_periods": self.skipped_periods,
+            "lateness": None if self.lateness is None else asdict(self.lateness),
             "metrics": {name: _plain(value) for name, value in self.metrics.items()},
             "blocks": {path: asdict(times) for path, times in self.blocks.items()},
             "error": None if self.error is None else self.error.to_json(),

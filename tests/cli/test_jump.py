@@ -11,7 +11,7 @@ from aloft.cli.jump import load_jump, settings_for, task_changes, task_of
 from aloft.cli.shared.robot_trials import TrialOptions, graph_of
 from aloft.planner.library import library
 from aloft.runtime.language.errors import AloftError
-from aloft.studies.rehearsal import trial_settings
+from aloft.studies.trials import trial_settings
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]

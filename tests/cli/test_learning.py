@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from aloft.planner.library.learnt import read_learnt
-from aloft.studies.jump_learning import ladder
+from aloft.studies.rehearsing.learning import ladder
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]

@@ -13,8 +13,8 @@ from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.library.rehearsed import Deviation, Rehearsed
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
-from aloft.studies import landing_rehearsal as landings
-from aloft.studies import rehearsal as study
+from aloft.studies.rehearsing import landing as landings
+from aloft.studies.rehearsing import lift_off as study
 
 FILE = SHIPPED.parent / "tasks" / "in_situ_12cm.yaml"
 BEFORE = Deviation((0.03, 0.0, 0.0), (0.0, -0.01, 0.0), 0.035, 0.002, 2, 3, 3)

@@ -92,7 +92,7 @@ def test_code_that_changed_by_one_ulp(recording: Path, call: Call, start: Start)
     source = recording.parent.parent / "gains.py"
     swapped = GAINS.replace("class Gain", "class Base").replace("(Gain)", "(Base)")
     source.write_text(swapped.replace("class OneUlp", "class Gain"))
-    process = start("replay", str(recording), "--check", PYTHONHASHSEED="8")
+    process = start("replay", str(recording), "--check", "--trust", PYTHONHASHSEED="8")
     output, errors = process.communicate(timeout=240)
     assert process.returncode == 1
     assert "differs first at tick 123: block 'gain': gain.y.value[1] was " in errors

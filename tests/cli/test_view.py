@@ -56,9 +56,9 @@ def test_where_the_code_has_gone_there_is_no_diagram(
     assert diagram_of(read(recording)).startswith(b"\x89PNG")
 
     def gone(*_: object) -> None:
-        raise AloftError("there is no block counter:Counter")
+        raise AloftError("the graph cannot be loaded any more")
 
-    monkeypatch.setattr(OpenedRun, "load", gone)
+    monkeypatch.setattr(OpenedRun, "changed", gone)
     assert diagram_of(read(recording)) == b""
     code, _ = view(recording, "--save", kept, "--no-show")
     assert code == 0 and b"\x89PNG" not in kept.read_bytes()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ....cli.replay import as_data, print_differences, write
-from ....cli.shared.options import GraphFolder, JsonBesideTables, opened_recording
+from ....cli.shared.options import GraphFolder, JsonBesideTables, Trust, opened_recording
 from ....cli.shared.output import (
     SET_HELP,
     console,
@@ -37,6 +37,7 @@ def branch(
         Path | None, typer.Option("--output", "-o", help="Both runs side by side, a .rrd file.")
     ] = None,
     folder: GraphFolder = None,
+    trust: Trust = False,
     as_json: JsonBesideTables = False,
 ) -> None:
     """Let a recorded run go on from its exact state with other parameters, beside the original."""
@@ -44,7 +45,7 @@ def branch(
 
     out = console(to_stderr=as_json)
     with errors_reported(as_json):
-        opened = opened_recording(recording, folder)
+        opened = opened_recording(recording, folder, trust=trust)
         rate = opened.file.header.base_rate
         graph = opened.changed(overrides) if overrides else opened.graph
         end = None if until is None else round(until * rate)

@@ -25,7 +25,7 @@ def explain(
 
     out = console(to_stderr=as_json)
     with errors_reported(as_json):
-        found = explain_run(opened_recording(recording, folder))
+        found = explain_run(opened_recording(recording, folder, look=True))
     outcome = f"{'success' if found.success else 'no success'}: {found.reason}"
     if found.chain:
         out.print(

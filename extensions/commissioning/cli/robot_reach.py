@@ -10,6 +10,7 @@ import typer
 
 from ....cli.shared.options import JsonBesideTables, Workers
 from ....cli.shared.output import console, errors_reported, print_json, say, table
+from ....files.names import inside
 from ....runtime.language.errors import ExitCode
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def reach(
     from ....robots.description import path_of, read
     from ....runtime.graph import load
     from ....studies.batch.seeds import parse_seeds
-    from ....studies.rehearsal import trial_settings
+    from ....studies.trials import trial_settings
     from ..reach.charts import save_reach_chart
     from ..reach.reach import SEEDS, bruce_reach
     from ..reach.reach import reach as find_reach
@@ -57,7 +58,7 @@ def reach(
         settings = {"robot": named, **trial_settings("robust")} if own else trial_settings("robust")
         graph = JumpGraph(named, path, settings)
         load(path, settings)
-        folder = out or Path("results") / "reach" / robot.name
+        folder = out or inside(Path("results") / "reach", robot.name)
         compile_functions(robot, folder, screen)
         told = find_reach(
             robot, graph, folder, seeds=chosen, workers=workers, minutes=minutes,

@@ -48,6 +48,7 @@ class CLibraryBlock(Block):
 
     Params = CLibraryParameters
     params: CLibraryParameters
+    program_files = ("folder",)
     state = State(CLibraryState, text="state of the library")
     about: ClassVar[Mapping[str, Any]] = {}
     """The content of the library's description."""
@@ -264,5 +265,6 @@ def _class_for(about: Mapping[str, Any], *, remote: bool) -> type[Block]:
                 text = "; ".join(each["text"] for each in fields[:3])
                 body[name] = (Input if kind == "inputs" else Output)(signal, text=text)
         body["about"], body["specialize"] = about, vars(CLibrary)["specialize"]
+        body["acts_outside"] = remote
         _CLASSES[key] = type("Library", (base,), body)
     return _CLASSES[key]

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ....files.names import is_file_name
 from ....runtime.language.errors import AloftError
 
 
@@ -170,6 +171,10 @@ def read_description(description: Path) -> Mapping[str, Any]:
         raise AloftError(f"{description} cannot be read: {error}") from error
     if not isinstance(about, dict) or not {"name", "target", "files", "memory_bytes"} <= set(about):
         raise AloftError(f"{description} describes no library; aloft export c writes such files")
+    if not is_file_name(str(about["name"])):
+        raise AloftError(
+            f"{description} describes no library: {about['name']!r} is no name of a file"
+        )
     if about["target"] != platform.machine():
         raise AloftError(
             f"{description} is for {about['target']}, and this computer is {platform.machine()}; "

@@ -59,6 +59,7 @@ class UnitBlock(Block):
 
     Params = FmuParameters
     params: FmuParameters
+    program_files = ("file",)
     memory = State(Remembered, text="what the FMU remembers")
 
     @classmethod

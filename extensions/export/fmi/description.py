@@ -10,8 +10,9 @@ from math import prod
 from pathlib import Path
 from typing import Any
 
+from ....files.names import is_file_name
 from ....runtime.language.block import Block
-from ....runtime.language.errors import BlockError, UnitError
+from ....runtime.language.errors import BlockError, UnitError, pip_line
 from ....runtime.language.signals import Field, Signal
 from ....runtime.language.units import BASE_UNITS, Unit, parse_unit
 
@@ -142,9 +143,7 @@ def _read(path: Path, file: str) -> Any:
     try:
         from fmpy.model_description import read_model_description
     except ImportError:
-        raise BlockError(
-            "export.CoSimulation needs FMPy: pip install 'aloft-robotics[fmi]'"
-        ) from None
+        raise BlockError(f"export.CoSimulation needs FMPy: {pip_line('fmi')}") from None
     try:
         read = read_model_description(str(path), validate=False)
     except Exception as error:  # noqa: BLE001  its own errors have no common base
@@ -152,6 +151,12 @@ def _read(path: Path, file: str) -> Any:
         raise BlockError(f"cannot read {file} as an FMU: {reason}") from None
     if not read.fmiVersion.startswith(("2.", "3.")):
         raise BlockError(f"{file} is of FMI {read.fmiVersion}; FMI 2.0 and 3.0 are understood")
+    for interface in (read.coSimulation, read.modelExchange, read.scheduledExecution):
+        if interface is not None and not is_file_name(interface.modelIdentifier or ""):
+            raise BlockError(
+                f"cannot read {file} as an FMU: its model identifier {interface.modelIdentifier!r} is "
+                "no name of a file"
+            )
     if read.coSimulation is None:
         kinds = {
             "model exchange": read.modelExchange,

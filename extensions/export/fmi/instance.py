@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ....files.names import UnsafeNameError, inside
 from ....runtime.language.errors import BlockError
 from ....runtime.language.signals import Signal
 from .description import Description, Variable, nearest
@@ -93,6 +94,7 @@ class FmuInstance:
         from fmpy.fmi2 import FMU2Slave
         from fmpy.fmi3 import FMU3Slave
 
+        _expect_fitting(self.described.path, Path(self._folder.name))
         folder = extract(str(self.described.path), self._folder.name)
         kind = FMU2Slave if self.described.version == 2 else FMU3Slave
         fmu = kind(
@@ -200,6 +202,26 @@ class FmuInstance:
             # an FMU that is written in Python puts its folder on the path, and leaves it there
             sys.path[:] = [p for p in sys.path if p in self._places or self._folder.name not in p]
             self._folder.cleanup()
+
+
+MOST_UNPACKED = 1 << 32
+"""Bytes that the files of an FMU may have, all together."""
+
+
+def _expect_fitting(path: Path, folder: Path) -> None:
+    """Raise ``BlockError`` for an archive with names that lead out of ``folder``, or that is too large."""
+    from zipfile import ZipFile
+
+    with ZipFile(path) as archive:
+        entries = archive.infolist()
+    size = sum(entry.file_size for entry in entries)
+    if size > MOST_UNPACKED:
+        raise BlockError(f"it would unpack to {size} bytes; expected {MOST_UNPACKED} at most")
+    for entry in entries:
+        try:
+            inside(folder, entry.filename)
+        except UnsafeNameError as error:
+            raise BlockError(str(error)) from error
 
 
 class Transfer:

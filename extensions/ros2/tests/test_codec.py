@@ -31,6 +31,9 @@ def values(codec: Codec, seed: int = 1) -> dict[str, np.ndarray]:
             "int64": rng.integers(0, 100, shape),
             "bool": np.ones(shape, bool),
         }[leaf.dtype]
+        if leaf.parts == "xyzw":
+            turns = found[leaf.name]
+            turns /= np.sqrt(np.sum(turns * turns, axis=-1, keepdims=True))
     return found
 
 

@@ -11,7 +11,7 @@ from aloft.extensions.ros2.node import (
     dds_type,
     full_name,
     is_topic,
-    sequence_in,
+    sender_in,
 )
 
 STRING = "std_msgs/msg/String"
@@ -54,9 +54,9 @@ def test_the_attachment_is_33_bytes() -> None:
     data = attachment(1, 0x1122334455667788, bytes(range(16)))
     assert data.hex() == "0100000000000000887766554433221110000102030405060708090a0b0c0d0e0f"
     assert len(data) == ATTACHMENT == 33
-    assert sequence_in(data) == 1
-    assert sequence_in(b"") is None and sequence_in(data[:-1]) is None
-    assert sequence_in(data[:16] + b"\x11" + data[17:]) is None
+    assert sender_in(data) == (data[17:], 1)
+    assert sender_in(b"") is None and sender_in(data[:-1]) is None
+    assert sender_in(data[:16] + b"\x11" + data[17:]) is None
 
 
 @pytest.mark.parametrize(

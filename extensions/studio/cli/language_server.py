@@ -1,11 +1,13 @@
 """``aloft language-server``: graph files in an editor, with problems while typing, hovers and go-to-block.
 
 It speaks the Language Server Protocol on standard input and output (extra ``editor``). What it says comes from the
-checks of ``aloft check`` and the declarations of the blocks.
+checks of ``aloft check`` and the declarations of the blocks. It imports no module of the workspace: a file that is
+opened runs nothing. Of a user's own blocks it knows the text of their source; ``aloft check`` examines their wires.
 """
 
 from __future__ import annotations
 
+import ast
 import inspect
 import re
 from dataclasses import dataclass
@@ -17,7 +19,8 @@ from ....files.document import read_value
 from ....files.nodes import ListNode, MapNode, Node
 from ....files.problems import LoadError, Position, Problem, Problems
 from ....runtime.language.block import Block
-from ....runtime.language.errors import AloftError
+from ....runtime.language.errors import AloftError, pip_line
+from ....runtime.language.importing import NOT_IMPORTED, find_source, without_imports
 from ....runtime.loading.reading.files import PREFIX, graph_path
 
 if TYPE_CHECKING:
@@ -39,13 +42,14 @@ def language_server() -> None:
 
 def problems_of(text: str, path: Path) -> tuple[Problem, ...]:
     """Return the problems that ``aloft check`` would report on the text if it were the file
-    ``path``."""
+    ``path``, but for those that are seen only when a user's own module is imported."""
     from ....runtime.loading.checked import checked_text
 
     try:
-        checked_text(text, path)
+        with without_imports():
+            checked_text(text, path)
     except LoadError as error:
-        return error.report.problems
+        return tuple(p for p in error.report.problems if NOT_IMPORTED not in p.message)
     except AloftError as error:
         from ....files.problems import Code
 
@@ -106,6 +110,9 @@ class GraphText:
         """Describe the thing under the cursor, in Markdown; empty for an unknown one."""
         cursor = Cursor.at(self.text, line, column)
         if cursor.keys[-1:] == ("use",) or cursor.word in self._uses():
+            if ":" in cursor.word:
+                own = _class_in_source(cursor.word, self.path.parent)
+                return f"**{cursor.word}**\n\n{ast.get_docstring(own[1]) or ''}" if own else ""
             known = self._reference(cursor.word)
             return f"**{known.name}**\n\n{known.summary}" if known else ""
         block = self._block(cursor.block)
@@ -136,6 +143,8 @@ class GraphText:
             file = graph_path(cursor.word, self.path.parent)
             return Position(str(file), 1, 1) if file.is_file() else None
         if cursor.keys[-1:] == ("use",):
+            if ":" in cursor.word:
+                return self._own_class(cursor.word)
             block_type = self._class(cursor.word)
             file_of = None if block_type is None else inspect.getsourcefile(block_type)
             if block_type is None or file_of is None:
@@ -163,9 +172,15 @@ class GraphText:
         from ....runtime.language.registry import find_block
 
         try:
-            return find_block(use, self.path.parent)
+            with without_imports():
+                return find_block(use, self.path.parent)
         except AloftError:
             return None
+
+    def _own_class(self, use: str) -> Position | None:
+        """Find a class of a user's module in its source."""
+        found = _class_in_source(use, self.path.parent)
+        return None if found is None else Position(str(found[0]), found[1].lineno, 1)
 
     def _reference(self, use: str) -> BlockReference | None:
         from ....runtime.language.reference import block_reference
@@ -196,6 +211,19 @@ class GraphText:
         return ""
 
 
+def _class_in_source(use: str, folder: Path) -> tuple[Path, ast.ClassDef] | None:
+    """Return the file of ``module:Class`` and the class in it; nothing is imported."""
+    module, _, name = use.partition(":")
+    file = find_source(module, (folder, Path()))
+    try:
+        tree = ast.parse(file.read_bytes()) if file is not None else ast.Module([], [])
+    except (OSError, SyntaxError, ValueError, RecursionError):
+        return None
+    classes = (node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == name)
+    found = next(classes, None)
+    return None if found is None or file is None else (file, found)
+
+
 def make_server() -> LanguageServer:
     """Make the server, which has not begun to read.
 
@@ -207,9 +235,7 @@ def make_server() -> LanguageServer:
         from pygls.lsp.server import LanguageServer
         from pygls.uris import from_fs_path, to_fs_path
     except ModuleNotFoundError as error:
-        raise AloftError(
-            "the language server needs pygls: pip install 'aloft-robotics[editor]'"
-        ) from error
+        raise AloftError(f"the language server needs pygls: {pip_line('editor')}") from error
     from .... import __version__
 
     server = LanguageServer("aloft", __version__, types.TextDocumentSyncKind.Full)

@@ -30,8 +30,8 @@ from ....planner.task.task import JumpTask
 from ....robots.description import RobotDescription, find_robot
 from ....studies.batch.jobs import job_results
 from ....studies.journal import Journal, Outcome, code_fingerprint
-from ....studies.rehearsal import trial_settings
 from ....studies.summary import wilson_interval
+from ....studies.trials import trial_settings
 from ..rows import Row
 from .random_tasks import SEED, random_tasks
 

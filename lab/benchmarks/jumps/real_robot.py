@@ -2,7 +2,7 @@
 
 Each seed draws one robot by ``graphs/trials/real.yaml``. It is calibrated once by ``aloft robot calibrate``, from its own
 motion alone; or the controller is told what the simulator drew, with errors of the size that a calibration is
-meant to reach (``studies/oracle``). A robot that learns (``studies/jump_learning``) makes smaller jumps first, and then each jump several times with
+meant to reach (``studies/oracle``). A robot that learns (``studies/rehearsing/learning``) makes smaller jumps first, and then each jump several times with
 fresh noise; it sees its own estimates alone. What it learns stays from one kind of jump to the next, in a file that the graph reads by
 ``plan.learnt``. A run lands if ``blocks.JumpScore`` says so.
 
@@ -31,7 +31,7 @@ from ....runtime.graph import Graph, load
 from ....runtime.language.errors import AloftError
 from ....studies.batch.jobs import job_results
 from ....studies.expansion import load_cell
-from ....studies.jump_learning import lesson_of
+from ....studies.rehearsing.learning import lesson_of
 from ....studies.summary import wilson_interval
 from ...studies.oracle import CALIBRATED, oracle_values
 from ..rows import Row

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ....studies.jump_learning import ladder
+from ....studies.rehearsing.learning import ladder
 
 EFFORT = 0.75
 """The share of the motors' torque and speed that the plans may use. The shipped recipe's 0.85 leaves too little for a

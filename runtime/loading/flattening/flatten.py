@@ -83,7 +83,7 @@ def flatten_file(path: Path, overrides: Overrides, problems: Problems) -> FlatGr
             f"cannot read {path}: no such file",
             Position(str(path), 0, 0),
             nearest=similar,
-            fix=f"{similar[0]}, which is shipped; 'aloft graphs' lists all",
+            fix=f"{similar[0]}, which is shipped; 'aloft graph' lists all",
         )
         return _Flattener(problems).run(path, None, overrides)
     return _Flattener(problems).run(path, read_file(path, str(path), problems), overrides)

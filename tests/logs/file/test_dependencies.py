@@ -2,10 +2,14 @@
 
 import os
 import subprocess
+import zlib
+from base64 import b64encode
 from hashlib import sha256
 from pathlib import Path
 
-from aloft.logs.file.dependencies import other_files, project_state, unpacked
+import pytest
+
+from aloft.logs.file.dependencies import MOST_BYTES, other_files, project_state, unpacked
 from aloft.logs.file.header import header_of, machine
 from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.parameters import Parameters, parameter
@@ -82,3 +86,27 @@ def test_asking_for_the_state_of_the_project_writes_nothing(tmp_path: Path) -> N
     index = (tmp_path / ".git" / "index").read_bytes()
     assert len(project_state(tmp_path)) == 40
     assert (tmp_path / ".git" / "index").read_bytes() == index
+
+
+def test_no_program_of_a_project_runs(tmp_path: Path) -> None:
+    git = ["git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=a@b"]
+    (tmp_path / "a.x").write_text("1")
+    (tmp_path / ".gitattributes").write_text("*.x filter=strange\n")
+    for arguments in (["init", "-q"], ["add", "."], ["commit", "-qm", "first"]):
+        subprocess.run([*git, *arguments], check=True)
+    marker = tmp_path.parent / f"{tmp_path.name}-marker"
+    for key in ("core.fsmonitor", "filter.strange.clean"):
+        subprocess.run([*git, "config", key, f"touch {marker}; cat"], check=True)
+    os.utime(tmp_path / "a.x", (1e9, 1e9))  # so that git would compare the content
+    assert len(project_state(tmp_path)) == 40
+    assert not marker.exists()
+    subprocess.run([*git, "status"], check=False, capture_output=True)
+    assert marker.exists(), "git itself runs them"
+
+
+def test_what_unpacks_to_too_much_is_refused() -> None:
+    packed = b64encode(zlib.compress(bytes(MOST_BYTES + 1))).decode()
+    with pytest.raises(ValueError, match="unpacks to more than 64 MiB"):
+        unpacked(packed)
+    with pytest.raises(ValueError, match="cut off"):
+        unpacked(b64encode(zlib.compress(b"abc" * 100)[:-8]).decode())

@@ -80,3 +80,21 @@ def test_damage_is_a_clear_error() -> None:
     for cut in (0, 3, 20, 30, len(whole) - 1):
         with pytest.raises(ValueError, match="packed rows"):
             unpack(bytes(whole[:cut]))
+
+
+@pytest.mark.parametrize(
+    ("count", "size", "text"),
+    [
+        (512, 1 << 20, "ever packed together"),
+        (1, 1 << 31, "ever packed together"),
+        (8, 64, "not the size"),
+    ],
+)
+def test_rows_that_say_to_be_larger_than_they_can_be(count: int, size: int, text: str) -> None:
+    """Nothing is unpacked before its size is known to be possible: 0.85 MB became 6 GB."""
+    data = bytearray(pack(0, np.zeros((4, 64), np.uint8)))
+    data[4:12] = np.array([count, size], "<u4").tobytes()
+    if text == "not the size":
+        data[24:32] = np.array([3, 1 << 30], "<u4").tobytes()  # columns that change, bytes
+    with pytest.raises(ValueError, match=text):
+        unpack(bytes(data))

@@ -19,7 +19,6 @@ from aloft.logs.recording.recorder import Recorder
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.placement.placed import PlacedGraph, split_over_machines
 from aloft.runtime.running.executor import run
-from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 from aloft.runtime.testing.spread import run_parts_of
 from aloft.runtime.transports.hub import Hub
@@ -60,8 +59,7 @@ def test_the_merged_recording_is_that_of_one_process(made: Made, tmp_path: Path)
     assert expected.outcome is not None
     assert run_hash_of(placed, parts) == (expected.outcome["run_hash"], 60)
     target = tmp_path / "whole.rrd"
-    bound = BoundGraph(placed.graph)
-    assert merge_recordings(target, placed, bound, parts, dict(expected.outcome)) == target
+    assert merge_recordings(target, placed, parts, dict(expected.outcome)) == target
     merged = read(target)
     assert merged.whole
     same(merged, expected)

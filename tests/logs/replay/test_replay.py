@@ -182,9 +182,25 @@ def test_a_real_robot_is_never_opened(recorded: KeptRun) -> None:
     real = graph(robot=RealNoise)
     assert default_inputs(real) == "recorded" and default_inputs(graph()) == "seed"
     assert replay(recorded, graph=real).identical
-    assert replay(recorded, graph=real, inputs="seed").result.reason == (
-        "block 'robot' failed in start: no such port"
-    )
+    assert replay(recorded, graph=real, inputs="seed").identical  # nor where everything is to run
+    with pytest.raises(ReplayError, match=r"robot .* acts outside of the graph"):
+        replay(recorded, graph=real, run=["robot"])
+
+
+class Publisher(Gain):
+    """A block that tells others."""
+
+    acts_outside = True
+
+    def start(self) -> None:
+        raise BlockError("it was started")
+
+
+@pytest.mark.parametrize("inputs", ["seed", "recorded"])
+def test_what_acts_outside_is_played(recorded: KeptRun, inputs: Any) -> None:
+    silent = graph(Publisher)
+    done = replay(recorded, graph=silent, inputs=inputs)
+    assert done.identical and "gain" not in done.ran
 
 
 def test_parameter_changes_are_part_of_the_run() -> None:

@@ -8,62 +8,26 @@ run again with the same seeds. What does not make the deviation smaller is not k
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
-from ..blocks.jumping.plan_progress import speed_error
-from ..files.nodes import text_of
-from ..hal.simulated.parameters import SimulatorParameters
-from ..mathematics.arrays import Array
-from ..mathematics.constants import GRAVITY
-from ..planner.library.library import shipped_folder
-from ..planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
-from ..runtime.graph import load
-from ..runtime.language.errors import AloftError
-from ..runtime.language.flat_graph import FlatGraph
-from ..runtime.loading.reading.files import settings_of
-from ..runtime.running.run_result import RunResult
-from .batch.jobs import job_results
-from .batch.seeds import overrides_for
-
-
-def trial_settings(trial: str, option: str = "--trial") -> dict[str, Any]:
-    """Return the settings of a trial. What only other trials set goes back to the simulator's
-    defaults.
-
-    Raises:
-        AloftError: there is no such trial.
-    """
-    if not trial:
-        return {}
-    files = {file.stem: file for file in sorted((shipped_folder() / "trials").glob("*.yaml"))}
-    if trial not in files:
-        raise AloftError(f"{option} {trial}: there is {', '.join(files)}")
-    defaults = SimulatorParameters().model_dump(mode="json", round_trip=True)
-    found = {
-        key: value
-        for file in files.values()
-        for key, value in (_default(key, defaults) for key in settings_of(file))
-    }
-    # a group that may be left out goes back as a whole, before what is set within it
-    return found | settings_of(files[trial])
-
-
-def _default(key: str, defaults: Mapping[str, Any]) -> tuple[str, Any]:
-    """Return the key of a trial's setting, or of the group around it that is left out by default, and the default."""
-    block, *names = key.split(".")
-    value: Any = defaults
-    for depth, name in enumerate(names, 1):
-        value = value[name]
-        if not isinstance(value, dict):
-            return ".".join([block, *names[:depth]]), value
-    return key, value
-
+from ...blocks.jumping.plan_progress import speed_error
+from ...files.nodes import text_of
+from ...mathematics.arrays import Array
+from ...mathematics.constants import GRAVITY
+from ...planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
+from ...runtime.graph import load
+from ...runtime.language.errors import AloftError
+from ...runtime.language.flat_graph import FlatGraph
+from ...runtime.running.run_result import RunResult
+from ..batch.jobs import job_results
+from ..batch.seeds import overrides_for
+from ..trials import trial_settings
 
 Found = TypeVar("Found")
 

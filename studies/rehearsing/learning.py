@@ -10,7 +10,7 @@ truth, so a recording of a real robot will do:
 - the torso's roll and pitch after touchdown, the middle between their extremes, and its heading, which
   are corrected by the angular momentum at lift-off.
 
-The answer of a landing to a correction is that of ``studies/landing_rehearsal``, which learns the same from
+The answer of a landing to a correction is that of ``studies/rehearsing/landing``, which learns the same from
 many simulated worlds. What is learnt is kept as ``planner/library/learnt`` says, and ``blocks.JumpPlan``
 takes it into use.
 """
@@ -22,14 +22,14 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ..mathematics.arrays import Array
-from ..mathematics.linear_algebra import inverse, product
-from ..mathematics.rotations import wrap
-from ..planner.library.learnt import LARGEST, Lesson, launch_of
-from ..planner.library.rehearsed import Vector
-from ..planner.task.plan import PlannedJump
-from .landing_rehearsal import AFTER, LEARNT, angles_of, response
-from .rehearsal import LEVER
+from ...mathematics.arrays import Array
+from ...mathematics.linear_algebra import inverse, product
+from ...mathematics.rotations import wrap
+from ...planner.library.learnt import LARGEST, Lesson, launch_of
+from ...planner.library.rehearsed import Vector
+from ...planner.task.plan import PlannedJump
+from .landing import AFTER, LEARNT, angles_of, response
+from .lift_off import LEVER
 
 BEFORE = 0.1
 """Time before lift-off in which the feet stand where they stood at the start [s]."""

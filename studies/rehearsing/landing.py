@@ -1,6 +1,6 @@
 """Rehearses a plan in drawn worlds and learns what makes it land upright and in its place.
 
-What a robot misses at lift-off (``studies/rehearsal``) is not all: the law of the flight, an early
+What a robot misses at lift-off (``studies/rehearsing/lift_off``) is not all: the law of the flight, an early
 touchdown, and a plan that itself lands leaning tilt the torso in much the same way in every world of
 a jump at the motors' limit. So the graph runs the plan with a few seeds in the robust trial, and the
 means over these runs are learnt away with the corrections of ``blocks.BalanceTarget``:
@@ -22,14 +22,14 @@ from typing import Any
 
 import numpy as np
 
-from ..mathematics.arrays import Array
-from ..mathematics.linear_algebra import inverse, product
-from ..mathematics.rotations import wrap
-from ..planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
-from ..planner.task.plan import PlannedJump
-from ..runtime.graph import load
-from ..runtime.running.run_result import RunResult
-from .rehearsal import LiftOff, deviation, in_all_worlds, missed_at_lift_off, parts_of
+from ...mathematics.arrays import Array
+from ...mathematics.linear_algebra import inverse, product
+from ...mathematics.rotations import wrap
+from ...planner.library.rehearsed import ZERO, Deviation, Rehearsed, Vector
+from ...planner.task.plan import PlannedJump
+from ...runtime.graph import load
+from ...runtime.running.run_result import RunResult
+from .lift_off import LiftOff, deviation, in_all_worlds, missed_at_lift_off, parts_of
 
 TRIAL = "robust"
 SEEDS = tuple(range(7001, 7013))

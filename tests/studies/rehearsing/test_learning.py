@@ -14,7 +14,7 @@ from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 from aloft.runtime.graph import load
 from aloft.runtime.running.run_result import RunResult
-from aloft.studies.jump_learning import lesson_of
+from aloft.studies.rehearsing.learning import lesson_of
 
 GRAPHS = SHIPPED.parent
 BRUCE = find_robot("bruce")

@@ -16,7 +16,7 @@ from aloft.robots.description import find_robot
 from aloft.runtime.graph import load
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.loading import flatten
-from aloft.studies.rehearsal import (
+from aloft.studies.rehearsing.lift_off import (
     LARGEST,
     NEGLIGIBLE,
     LiftOff,

@@ -14,7 +14,7 @@ from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 from aloft.runtime.graph import load
 from aloft.runtime.running.run_result import RunResult
-from aloft.studies.landing_rehearsal import (
+from aloft.studies.rehearsing.landing import (
     LARGEST,
     LEARNT,
     LEAST_SHARE,
@@ -26,7 +26,7 @@ from aloft.studies.landing_rehearsal import (
     response,
     touchdown_of,
 )
-from aloft.studies.rehearsal import LiftOff
+from aloft.studies.rehearsing.lift_off import LiftOff
 
 GRAPHS = SHIPPED.parent
 BRUCE = find_robot("bruce")
