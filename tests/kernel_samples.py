@@ -10,7 +10,7 @@ from aloft.blocks.scoring.estimator_score import EstimatorRecord
 from aloft.blocks.scoring.footing import Footing
 from aloft.blocks.scoring.jump_criteria import JumpRecord, JumpSeries
 from aloft.blocks.signals import PhaseState, RobotTruth, WholeBodyCommand
-from aloft.hal.simulated import external_forces, plant
+from aloft.hal.simulated import external_forces
 from aloft.mathematics import elementwise
 from aloft.mathematics.body_dynamics import BodyMotion, body_motion, composite_inertias
 from aloft.mathematics.compiling.arguments import record_type

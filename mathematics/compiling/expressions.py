@@ -148,9 +148,9 @@ class Expressions:
         for one, other in zip(
             (*[1] * (rank - len(a)), *a), (*[1] * (rank - len(b)), *b), strict=True
         ):
-            if None not in (one, other) and one != other and 1 not in (one, other):
+            if None not in (one, other) and one != other and not (repeats(one) or repeats(other)):
                 raise self._error(node, f"shapes {shown(a)} and {shown(b)} do not fit together")
-            made.append(other if one == 1 or one is None else one)
+            made.append(other if repeats(one) or one is None else one)
         return tuple(made)
 
     def _without_number(self, node: ast.expr) -> Kind:
@@ -324,6 +324,12 @@ def indices_of(node: ast.Subscript) -> list[ast.expr]:
 def is_slice(index: ast.expr) -> bool:
     """Return whether an index is a slice, or a cut in place of one."""
     return isinstance(index, ast.Slice) or hasattr(index, "length")
+
+
+def repeats(size: int | None) -> bool:
+    """Return whether a dimension of one element stands for all places of another's; one whose size
+    only a call tells is not repeated."""
+    return size == 1 and type(size) is int
 
 
 def shown(shape: Sequence[int | None]) -> str:
