@@ -116,8 +116,6 @@ class Expressions:
                 if function.attr in ("floor", "ceil", "trunc")
                 else (bool if function.attr.startswith("is") else float)
             )
-        from .numpy_numbers import FLAGS, KEEPING
-
         return bool if function.attr in FLAGS else None if function.attr in KEEPING else float
 
     def _joined(
@@ -340,5 +338,9 @@ def shown(shape: Sequence[int | None]) -> str:
 
 _WIDTHS = (bool, int, float)
 _ELEMENTS: Mapping[str, type] = {"float64": float, "int64": int, "bool": bool}
+FLAGS = ("isnan", "isfinite", "isinf")
+"""NumPy's functions of a number that answer with a flag."""
+KEEPING = ("maximum", "minimum", "clip", "sign")
+"""Those that answer with a whole number for whole numbers."""
 NUMBERS = "__aloft_numbers__"
 """Name in a kernel's module under which ``numpy_numbers`` stands for rewritten code."""

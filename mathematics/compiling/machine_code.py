@@ -8,6 +8,7 @@ import os
 import re
 from collections.abc import Callable, Mapping
 from functools import cache
+from importlib import import_module
 from importlib.metadata import version
 from itertools import count
 from typing import Any
@@ -215,9 +216,10 @@ def _called_of_numba(code: bytes) -> dict[str, int]:
     names = {each.decode() for each in _NUMBA.findall(code)}
     if not names:
         return {}
-    from .numba_calls import address_of
-
-    return {name: address_of(name) for name in names}
+    found = import_module(
+        f"{__package__}.numba_calls"
+    )  # which needs this file, and is rarely needed
+    return {name: found.address_of(name) for name in names}
 
 
 class MachineCode:
