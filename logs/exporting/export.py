@@ -26,7 +26,7 @@ import numpy as np
 from ...robots.description import Hull, RobotDescription
 from ...robots.shapes import surface
 from ...robots.surfaces import quaternion_from_z, robot_surfaces
-from ...runtime.language.errors import AloftError
+from ...runtime.language.errors import AloftError, pip_line
 from ...runtime.language.extensions import is_provided, missing_extension, provided
 from ...runtime.language.importing import without_imports
 from ..file.format import RecordedField, RecordedRows, nanoseconds
@@ -275,11 +275,9 @@ def export_mcap(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None
     try:
         from mcap.writer import Writer
     except ImportError:
-        raise ExportError(
-            "MCAP needs the library mcap; pip install 'aloft-robotics[mcap]'"
-        ) from None
+        raise ExportError(f"MCAP needs the library mcap; {pip_line('mcap')}") from None
     if find_spec("rosbags") is None:
-        raise ExportError("MCAP needs the library rosbags; pip install 'aloft-robotics[mcap]'")
+        raise ExportError(f"MCAP needs the library rosbags; {pip_line('mcap')}")
     ports: dict[str, list[RecordedField]] = {}
     for field in chosen(run, names):
         ports.setdefault(field.name.rpartition(".")[0], []).append(field)
@@ -317,7 +315,7 @@ def export_bag(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> None:
         OSError: the folder cannot be written.
     """
     if find_spec("rosbags") is None:
-        raise ExportError("a bag needs the library rosbags; pip install 'aloft-robotics[mcap]'")
+        raise ExportError(f"a bag needs the library rosbags; {pip_line('mcap')}")
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 

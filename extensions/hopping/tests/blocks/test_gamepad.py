@@ -64,8 +64,8 @@ def test_sticks_and_buttons_become_a_velocity() -> None:
 def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(AloftError, match=r"pip install 'aloft-robotics\[gamepad\]'"):
-        load("aloft:hopping/steer_by_gamepad")
+    with pytest.raises(AloftError, match=r"pip install 'pygame"):
+        load(shipped_folder() / "steer_by_gamepad.yaml")
 
 
 def test_a_gamepad_that_closes_leaves_another_its_events() -> None:
