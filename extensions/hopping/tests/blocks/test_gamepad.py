@@ -65,7 +65,7 @@ def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyP
     monkeypatch.setitem(sys.modules, "pygame", None)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(AloftError, match=r"pip install 'pygame"):
-        load(shipped_folder() / "steer_by_gamepad.yaml")
+        load("aloft:hopping/steer_by_gamepad")
 
 
 def test_a_gamepad_that_closes_leaves_another_its_events() -> None:
