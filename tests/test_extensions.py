@@ -22,7 +22,7 @@ from aloft.runtime.language.extensions import (
 )
 
 ROOT = Path(aloft.__file__).parent
-JUMP_HASH = "d31774123e384526ed97e4ea3f36751e"
+JUMP_HASH = "d899a365a3d5b2eb445d93941b896d03"
 CHECK = """
 import json, sys
 from pathlib import Path
