@@ -154,7 +154,7 @@ def test_a_filter_finds_the_zeros_of_a_column_of_zeros(tmp_path: Path) -> None:
     aloft.write_recording(tmp_path / "a.rrd", result)
     export_parquet(read(tmp_path / "a.rrd"), tmp_path / "a.parquet")
     for rule in (("in", [0.0]), ("==", 0.0), ("<=", 0.0), (">=", 0.0)):
-        found = parquet.read_table(tmp_path / "a.parquet", filters=[("zero.y.value", *rule)])
+        found = parquet.read_table(tmp_path / "a.parquet", filters=[("zero.y.value[0]", *rule)])
         assert len(found) == 10, rule
 
 
