@@ -12,6 +12,8 @@ import pytest
 import aloft
 import aloft.lab.benchmarks.catalogue
 import aloft.runtime.loading
+from aloft.logs.file.code import code_of, remember
+from aloft.runtime.loading import flatten
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]
@@ -175,10 +177,13 @@ def complete(start: Start, words: str) -> list[str]:
 
 
 @pytest.mark.long
-def test_the_tab_key_completes(folder: Path, start: Start) -> None:
+def test_the_tab_key_completes(folder: Path, start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     assert complete(start, "aloft ru") == ["run"]
     assert "--seeds" in complete(start, "aloft run --se")
     assert complete(start, "aloft blocks blocks.Ga") == ["blocks.Gain"]
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+    assert complete(start, "aloft run count.yaml --set counter.s") == [], "its module never ran"
+    remember(code_of(flatten(folder / "count.yaml")))
     assert complete(start, "aloft run count.yaml --set counter.s") == [
         "counter.seed=",
         "counter.stop_at=",
