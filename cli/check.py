@@ -1,4 +1,4 @@
-"""``aloft check``, ``aloft graphs`` and ``aloft doctor``: is a graph right, which are there, can they run here."""
+"""``aloft check``, ``aloft graph`` and ``aloft doctor``: is a graph right, which are there, can they run here."""
 
 from __future__ import annotations
 

@@ -65,14 +65,12 @@ def export(
         bool,
         typer.Option(
             "--mcap",
-            help="MCAP for Foxglove, PlotJuggler; needs pip install 'aloft-robotics[mcap]'.",
+            help="MCAP, for Foxglove and PlotJuggler (extra mcap).",
         ),
     ] = False,
     bag: Annotated[
         bool,
-        typer.Option(
-            "--bag", help="A ROS 2 bag, a folder; needs pip install 'aloft-robotics[mcap]'."
-        ),
+        typer.Option("--bag", help="A ROS 2 bag, a folder (extra mcap)."),
     ] = False,
     signal: Annotated[
         list[str] | None,

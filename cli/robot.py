@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ..robots.description import ReadRobot
+    from ..robots.importing.new_yaml import NewYaml
 
 robot = typer.Typer(
     name="robot",
@@ -119,17 +120,28 @@ def import_(
 ) -> None:
     """Write the short YAML beside a URDF or MJCF file, filled with what can be found or guessed."""
     with _description_errors_reported(as_json):
-        target, text, notes = _imported(file, out, force)
+        target, made = _imported(file, out, force)
         try:
-            target.write_text(text, encoding="utf-8")
+            target.write_text(made.text, encoding="utf-8")
         except OSError as error:
             raise AloftError(f"{target} cannot be written: {error.strerror}") from error
     if as_json:
-        print_json({"success": True, "written": str(target), "notes": notes})
+        readings = {
+            each.judge: {
+                "compared": each.compared, "largest_difference": each.largest, "of": each.where,
+                "on_purpose": [*each.named], "not_read": each.why,
+            }
+            for each in made.compared
+        }  # fmt: skip
+        print_json(
+            {"success": True, "written": str(target), "notes": made.notes, "readings": readings}
+        )
         return
+    from ..robots.comparison.differences import summary
+
     screen = console()
     say(screen, f"wrote {target}: look at each part, then `aloft robot show {target}`")
-    for note in notes:
+    for note in (*made.notes, *summary(made.compared)):
         say(screen, f"  - {note}")
 
 
@@ -211,7 +223,7 @@ def _draw(found: ReadRobot, picture: Path) -> None:
         raise AloftError(f"no picture: {error}") from error
 
 
-def _imported(file: Path, out: Path | None, force: bool) -> tuple[Path, str, list[str]]:
+def _imported(file: Path, out: Path | None, force: bool) -> tuple[Path, NewYaml]:
     """Return the path of the YAML, its text and its notes. Raises ``RobotError`` for a file that is
     wrong and ``AloftError`` for one that must not be written."""
     from ..robots.description import MODEL_FILES, OTHER_FORMATS, read
@@ -227,8 +239,7 @@ def _imported(file: Path, out: Path | None, force: bool) -> tuple[Path, str, lis
     target = out or file.with_suffix(".yaml")
     if target.exists() and not force:
         raise AloftError(f"{target} is there already; --force writes over it")
-    text, notes = new_yaml(file, target)
-    return target, text, notes
+    return target, new_yaml(file, target)
 
 
 def _print_robot(out: Console, about: dict[str, Any]) -> None:

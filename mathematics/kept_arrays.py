@@ -9,29 +9,23 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache
 from importlib import import_module, metadata
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..files.cache import Cache
+
 Arrays = Mapping[str, NDArray[Any]]
 
-MOST_FILES = 256
-"""Number of results that are kept; beyond it, the least recently used are deleted."""
-
+CACHE = Cache("arrays", ".npz", most=256)
 _MARK = "array "
-
-
-def kept_folder() -> Path:
-    """Return the folder of kept results: ``aloft/arrays`` in the user's cache folder."""
-    root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(root) / "aloft" / "arrays"
 
 
 def kept_arrays(decided_by: bytes, compute: Callable[[], Arrays]) -> Arrays:
@@ -42,12 +36,10 @@ def kept_arrays(decided_by: bytes, compute: Callable[[], Arrays]) -> Arrays:
             ``package_code.code_digest`` gives it, the code. Nothing is kept of an error.
     """
     name = hashlib.blake2b(decided_by + processor(), digest_size=16).hexdigest()
-    place = kept_folder() / f"{name}.npz"
-    found = _read(place)
+    found = _read(name)
     if found is None:
         found = compute()
-        with suppress(OSError):  # no place for it: computed again the next time
-            _write(place, found)
+        _write(name, found)
     return found
 
 
@@ -62,32 +54,23 @@ def processor() -> bytes:
     return repr((features, os.environ.get("OPENBLAS_CORETYPE", ""))).encode()
 
 
-def _read(place: Path) -> Arrays | None:
-    """Read the arrays kept in a file; ``None`` where there is none, or it is damaged."""
-    try:
-        with np.load(place, allow_pickle=False) as file:
-            found = {name.removeprefix(_MARK): file[name] for name in file.files}
-        os.utime(place)
-    except Exception:  # noqa: BLE001  # of a damaged file NumPy and zipfile raise errors of many types
+def _read(name: str) -> Arrays | None:
+    """Return the arrays that are kept under a name; ``None`` where there are none that may be used."""
+    data = CACHE.load(name)
+    if data is None:
         return None
-    return found
-
-
-def _write(place: Path, arrays: Arrays) -> None:
-    place.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=place.parent, suffix=".part")
     try:
-        with os.fdopen(handle, "wb") as file:
-            save: Any = np.savez
-            # marked, as an array may be called like a parameter of savez
-            save(file, **{f"{_MARK}{name}": array for name, array in arrays.items()})
-        os.replace(temporary, place)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-    kept = sorted(place.parent.iterdir(), key=lambda path: path.stat().st_mtime)
-    for old in kept[:-MOST_FILES]:
-        old.unlink(missing_ok=True)
+        with np.load(BytesIO(data), allow_pickle=False) as file:
+            return {name.removeprefix(_MARK): file[name] for name in file.files}
+    except Exception:  # noqa: BLE001  # of a file of another form NumPy and zipfile raise errors of many types
+        return None
+
+
+def _write(name: str, arrays: Arrays) -> None:
+    memory, save = BytesIO(), cast(Any, np.savez)
+    # marked, as an array may be called like a parameter of savez
+    save(memory, **{f"{_MARK}{key}": array for key, array in arrays.items()})
+    CACHE.save(name, memory.getvalue())
 
 
 LIBRARIES = ("numpy", "pin")

@@ -37,6 +37,7 @@ from .shapes import Capsule, Hull, Shape
 from .validation import DescriptionError, RobotError, find_errors
 
 if TYPE_CHECKING:
+    from .comparison.differences import Differences
     from .importing.description_data import Imported
 
 
@@ -57,12 +58,14 @@ _KIND = ("a robot's description", "name, base, links, joints")
 @dataclass(frozen=True)
 class ReadRobot:
     """A robot that was read: its ``description``, the file it is from, the URDF or MJCF behind it
-    if there is one, and what that lacks or what was approximated in ``notes``."""
+    if there is one, what that lacks or what was approximated in ``notes``, and how it compares with other programs' readings
+    of that file."""
 
     description: RobotDescription
     path: Path
     model_file: Path | None = None
     notes: tuple[str, ...] = ()
+    compared: tuple[Differences, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -208,6 +211,7 @@ def _named_file(path: Path, text: LocatedYaml) -> Path:
 
 
 def _read_model(path: Path, added: Path | None, text: LocatedYaml | None) -> ReadRobot:
+    from .comparison.differences import unread
     from .importing.description_data import import_robot, written_path
     from .importing.fit_to_ground import fit_to_ground
 
@@ -218,7 +222,7 @@ def _read_model(path: Path, added: Path | None, text: LocatedYaml | None) -> Rea
         from .importing.new_yaml import guess
 
         content, guessed = guess(imported)
-        imported = import_robot(path, content)
+        imported = import_robot(path, content, imported.model)
     errors = [*(text.errors if text else ()), *imported.errors]
     # A fault of the YAML's own keys also shows in what is made of them: once is enough.
     own = {description_error.path[:2] for description_error in errors}
@@ -227,11 +231,12 @@ def _read_model(path: Path, added: Path | None, text: LocatedYaml | None) -> Rea
     if errors:
         placed = [_placed(description_error, imported, text) for description_error in errors]
         raise RobotError(str(added or path), placed)
+    compared = tuple(imported.compared())
     robot = RobotDescription.model_validate(imported.data)
     robot = _with_locations(robot, (added or path).parent)
     robot, more = fit_to_ground(robot, "standing" in content, imported.model.pose)
-    notes = (*guessed, *imported.notes, *more, *wrong_size(robot))
-    return ReadRobot(robot, added or path, path, notes)
+    notes = (*guessed, *imported.notes, *more, *wrong_size(robot), *unread(compared))
+    return ReadRobot(robot, added or path, path, notes, compared)
 
 
 def _with_locations(robot: RobotDescription, folder: Path) -> RobotDescription:

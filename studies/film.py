@@ -19,7 +19,7 @@ from ..logs.viewing.scene_ports import scene_ports
 from ..mathematics.arrays import Array
 from ..plotting import DPI, Panel, draw_panels, image, new_figure, style
 from ..robots.kinematics import link_poses
-from ..runtime.language.errors import AloftError
+from ..runtime.language.errors import AloftError, pip_line
 from .offscreen import Offscreen, Pixels, View
 
 if TYPE_CHECKING:
@@ -303,9 +303,7 @@ def _write_mp4(path: Path, frames: Iterator[Image], rate: float) -> int:
     try:
         import av
     except ImportError:
-        raise AloftError(
-            "MP4 needs PyAV: pip install 'aloft-robotics[pictures]'; GIF does not"
-        ) from None
+        raise AloftError(f"MP4 needs PyAV: {pip_line('pictures')}; GIF does not") from None
     count = 0
     with av.open(str(path), "w") as container:
         stream: Any = container.add_stream("libx264", rate=Fraction(rate).limit_denominator(1000))

@@ -1,6 +1,6 @@
 """Pictures of the simulated robot without a screen: MuJoCo's renderer on EGL.
 
-Needs PyOpenGL (``pip install 'aloft-robotics[pictures]'``) and, on Linux, a driver for OpenGL without a
+Needs PyOpenGL (the extra ``pictures``) and, on Linux, a driver for OpenGL without a
 screen; Mesa's does it on the processor: ``apt-get install libegl1 libgl1-mesa-dri``.
 """
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Pixels = NDArray[np.uint8]
 
 REMEDY = (
-    "pip install 'aloft-robotics[pictures]' and, on Linux, apt-get install libegl1 libgl1-mesa-dri; "
+    "install the extra pictures and, on Linux, apt-get install libegl1 libgl1-mesa-dri; "
     "nothing can be drawn without"
 )
 PAINT = {

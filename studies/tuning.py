@@ -35,7 +35,7 @@ from typing import TYPE_CHECKING, Any
 from ..files.document import read_file
 from ..files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain, text_of
 from ..files.problems import Code, LoadError, Position, Problems
-from ..runtime.language.errors import AloftError
+from ..runtime.language.errors import AloftError, pip_line
 from ..runtime.loading.reading.written import unknown_key
 from .execution import Run
 from .expansion import Cell, Tuned, cells
@@ -360,7 +360,7 @@ def optuna_study(verb: str, seed: str, *, random: bool = False) -> OptunaStudy:
     try:
         import optuna
     except ImportError:
-        raise AloftError(f"aloft {verb} needs Optuna: pip install 'aloft-robotics[tune]'") from None
+        raise AloftError(f"aloft {verb} needs Optuna: {pip_line('tune')}") from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     number = int.from_bytes(hashlib.sha256(seed.encode()).digest()[:4], "big")
     if random:

@@ -24,7 +24,7 @@ PACKAGES = (*CORE, "extensions", "lab")
 ALLOWED: dict[str, tuple[str, ...]] = {
     "processes": (),
     "files": ("runtime/language/errors", "runtime/language/units"),
-    "mathematics": ("processes",),
+    "mathematics": ("processes", "files/cache"),
     "robots": ("files", "mathematics"),
     "runtime/language": ("files", "robots", "mathematics/compiling", "mathematics/kernel", "mathematics/arrays", "mathematics/elementary", "mathematics/ground_surface"),
     "runtime/running": (
@@ -59,18 +59,18 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "planner/models": ("planner/task", "mathematics", "robots"),
     "planner/problem": ("planner/task", "planner/models", "mathematics", "robots"),
     "planner/solving": (
-        "processes", "planner/task", "planner/models", "planner/problem", "mathematics", "robots",
+        "processes", "files/cache", "planner/task", "planner/models", "planner/problem", "mathematics", "robots",
     ),
     "planner/checking": (
         "planner/task", "planner/models", "mathematics", "robots", "runtime/language",
     ),
     "planner/library": (
         "planner/task", "planner/models", "planner/problem", "planner/solving", "planner/checking",
-        "mathematics", "robots", "runtime/language",
+        "files/cache", "mathematics", "robots", "runtime/language",
     ),
     "extensions/hopping/planner": (
         "planner/task", "planner/models", "planner/problem", "planner/solving", "planner/checking", "planner/library",
-        "mathematics", "robots", "runtime/language",
+        "files/cache", "mathematics", "robots", "runtime/language",
     ),
     "planner/drawing": (
         "planner/task", "planner/models", "planner/checking", "planner/library", "mathematics/arrays", "robots",

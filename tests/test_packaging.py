@@ -76,12 +76,7 @@ def test_without_the_source_bench_says_how_to_get_the_benchmarks(
     assert done.stderr.startswith(
         "error: 'aloft bench' is part of the lab, which is not in the wheel; install aloft from"
     )
-    for command in (
-        f"pip download --no-deps --no-binary :all: aloft-robotics=={aloft.__version__}",
-        f"tar xzf aloft_robotics-{aloft.__version__}.tar.gz",
-        f"pip install --editable aloft_robotics-{aloft.__version__}",
-    ):
-        assert f"    {command}\n" in done.stderr
+    assert "from a clone of its repository instead: pip install --editable ." in done.stderr
 
 
 FIRST_RUN = """
@@ -173,3 +168,22 @@ def test_importing_loads_no_heavy_library(code: str) -> None:
 
 def test_importing_the_package_itself_loads_nothing() -> None:
     assert loaded_by("import aloft") & {"numpy", "pydantic", "typer", "yaml"} == set()
+
+
+def test_the_package_page_has_nothing_that_an_index_cannot_show() -> None:
+    text = (ROOT / PROJECT["project"]["readme"]).read_text()
+    assert "](" not in text and "<img" not in text
+    graph = text.split("```yaml\n")[1].split("```")[0]
+    assert graph in (ROOT / "README.md").read_text()
+
+
+def test_the_extra_all_has_every_extra_of_users() -> None:
+    extras = PROJECT["project"]["optional-dependencies"]
+    (all_of_them,) = extras["all"]
+    assert set(all_of_them.split("[")[1].rstrip("]").split(",")) == set(extras) - {"all", "peers"}
+
+
+def test_notice_names_every_robot_whose_file_is_from_elsewhere() -> None:
+    notice = (ROOT / "NOTICE").read_text()
+    for path in sorted((ROOT / "robots").glob("*/*.yaml")):
+        assert path.stem in notice, path.stem

@@ -26,6 +26,9 @@ class Integrator(Bounded, Block):
     T is the block's period. With bounds x[n+1] is kept within them, so nothing winds up beyond.
     Where ``reset`` holds in tick n, x[n+1] = initial. A Moore block, so it breaks a loop;
     ``TrapezoidalIntegrator`` is more exact and does not.
+
+    Forward Euler adds energy: two of these in a ring, as a mass on a spring, grow by a factor of
+    sqrt(1 + (w T)^2) per run at w rad/s. ``DoubleIntegrator`` does not.
     """
 
     class Params(InitialValueParameters):
@@ -62,6 +65,64 @@ class Integrator(Bounded, Block):
         else:
             x.value[:] += u.value * period
             x.value[:] = min(constants.upper, max(constants.lower, x.value))
+
+
+class DoubleIntegralState(Signal):
+    """State of the double integrator."""
+
+    rate = Field("n", text="the integral of the input")
+    value = Field("n", text="the integral of the rate")
+
+
+class DoubleIntegrator(Block):
+    """From acceleration to position by semi-implicit Euler: the position takes the new rate.
+
+    rate[n+1] = rate[n] + T u[n], y[n+1] = y[n] + T rate[n+1], with T the block's period. A mass on a
+    spring of w rad/s keeps its amplitude as long as w T < 2, where two of ``Integrator`` in a row
+    would grow (symplectic Euler). Where ``reset`` holds in tick n, both start again from their
+    initial values. A Moore block, so it breaks a loop.
+    """
+
+    class Params(VectorParameters):
+        initial: ScalarOrVector = parameter(
+            0.0, text="the first position: n numbers, or one for all elements"
+        )
+        initial_rate: ScalarOrVector = parameter(0.0, text="the first rate, likewise")
+
+    params: Params
+    u = Input(Vector, text="the acceleration")
+    reset = Input(Flag, text="starts again from the initial values", default=NEVER)
+    rate = Output(Vector, text="its integral")
+    y = Output(Vector, text="the integral of the rate")
+    x = State(DoubleIntegralState, text="position and rate")
+
+    @classmethod
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
+        """Return the unit of the acceleration times a second, once and twice."""
+        u = inputs["u"]
+        return {"rate": u and u.times(SECOND), "y": u and u.times(SECOND).times(SECOND)}
+
+    def setup(self) -> None:
+        self.x.rate[...] = self.params.initial_rate
+        self.x.value[...] = self.params.initial
+
+    @kernel
+    @staticmethod
+    def emit(rate: Vector, y: Vector, x: DoubleIntegralState) -> None:
+        rate.value[:] = x.rate
+        y.value[:] = x.value
+
+    @kernel
+    @staticmethod
+    def update(
+        u: Vector, reset: Flag, x: DoubleIntegralState, params: Params, period: float
+    ) -> None:
+        if reset.value:
+            x.rate[:] = params.initial_rate
+            x.value[:] = params.initial
+        else:
+            x.rate[:] += u.value * period
+            x.value[:] += x.rate * period
 
 
 class TrapezoidalState(Signal):

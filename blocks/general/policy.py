@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
+from ...runtime.language.errors import pip_line
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import SourceParameters, UnitFromParameters
@@ -180,9 +181,7 @@ def _session(path: Path, shown: str) -> Any:
     try:
         import onnxruntime
     except ImportError:
-        raise ValueError(
-            "blocks.Policy needs ONNX Runtime: pip install 'aloft-robotics[onnx]'"
-        ) from None
+        raise ValueError(f"blocks.Policy needs ONNX Runtime: {pip_line('onnx')}") from None
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL

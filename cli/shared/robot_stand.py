@@ -1,4 +1,4 @@
-"""``aloft stand``: lets any robot stand, squat, and be pushed as it stands."""
+"""``aloft robot stand``: lets any robot stand, squat, and be pushed as it stands."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def stand(
     as_json: JsonBesideTables = False,
     quiet: Quiet = False,
 ) -> None:
-    """Let a robot stand in its trial, or squat: aloft stand --robot go1.urdf --squat 6cm."""
+    """Let a robot stand in its trial, or squat: aloft robot stand --robot go1.urdf --squat 6cm."""
     from ...runtime.graph import load
     from ...runtime.loading.reading.files import PREFIX, shipped_graphs
     from ...studies.batch.seeds import overrides_for, parse_seeds

@@ -28,6 +28,7 @@ from ...runtime.links.path_ages import NAME
 from ...runtime.live.part_feed import PartFeed
 from ...runtime.loading import checked_file
 from ...runtime.placement.placed import PlacedGraph, split_over_machines
+from ...runtime.running.lateness import TickLateness
 from ...runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
 from ...runtime.running.run_result import RunResult, merge_metrics
 from ...runtime.running.sink import Sink
@@ -237,6 +238,7 @@ def _whole_result(
         blocks=_times(graph, part_reports),
         overruns=sum(part.get("overruns", 0) for part in part_reports.values()),
         skipped_periods=sum(part.get("skipped_periods", 0) for part in part_reports.values()),
+        lateness=TickLateness.merged(part.get("lateness") for part in part_reports.values()),
         error=error,
         stop_problems=_collected(part_reports, "stop_problems"),
         block_warnings=_collected(part_reports, "block_warnings"),

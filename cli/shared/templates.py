@@ -112,7 +112,7 @@ def test_graph() -> None:
 README = """\
 # {title}
 
-A graph of blocks for [aloft](https://pypi.org/project/aloft-robotics).
+A graph of blocks for aloft.
 
     aloft check graph.yaml        # everything that is wrong, at once
     aloft graph graph.yaml --web  # the block diagram in the browser

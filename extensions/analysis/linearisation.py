@@ -28,7 +28,7 @@ from ...logs.file.header import recorded_signals
 from ...mathematics.arrays import Array, Flags
 from ...runtime.background.background_block import BackgroundBlock
 from ...runtime.graph import Graph, load
-from ...runtime.language.errors import AloftError
+from ...runtime.language.errors import AloftError, pip_line
 from ...runtime.running.memory import Region
 from ...runtime.running.stepping import SteppedRun
 from .coordinates import (
@@ -183,7 +183,7 @@ def import_control() -> Any:
         import control
     except ImportError as error:
         raise AloftError(
-            "python-control is not installed; install it with: pip install 'aloft-robotics[analysis]'"
+            f"python-control is not installed; install it with: {pip_line('analysis')}"
         ) from error
     return control
 

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from ...files.names import inside
-from ...runtime.language.errors import AloftError
+from ...runtime.language.errors import AloftError, pip_line
 from ...runtime.placement.placed import PlacedGraph
 from ...runtime.transports.tls import (
     AUTHORITY,
@@ -143,7 +143,7 @@ def _library() -> tuple[Any, Any, Any]:
         from cryptography.hazmat.primitives.asymmetric import ec
     except ImportError as error:
         raise AloftError(
-            "certificates are made with the library cryptography: pip install 'aloft-robotics[keys]'"
+            f"certificates are made with the library cryptography: {pip_line('keys')}"
         ) from error
     return x509, hashes, ec
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.language.errors import BlockError
+from ...runtime.language.errors import BlockError, pip_line
 from ...runtime.language.signals import Field, Signal
 from .headers import (
     FrameNames,
@@ -111,7 +111,7 @@ def type_store(distribution: str) -> Any:
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
         raise BlockError(
-            "ROS 2's message types come with the library rosbags: pip install 'aloft-robotics[ros2]'"
+            f"ROS 2's message types come with the library rosbags: {pip_line('ros2')}"
         ) from error
     name = f"ROS2_{distribution.upper()}"
     if name not in Stores.__members__:

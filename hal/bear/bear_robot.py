@@ -202,6 +202,11 @@ class BearRobot(DrivenRobot):
             self.stop_after_fault()
         return missed
 
+    def ready_at(self) -> int:
+        """Return when the cycle was done with which the tick begins, by ``time.perf_counter_ns``; zero
+        in virtual time."""
+        return 0 if self._thread is None else self._thread.done_at(self._next_tick)
+
     def damp(self) -> None:
         """Put the drives into damping for a tick; if they were never on, only watch them."""
         driver, thread = self.driver, self._thread

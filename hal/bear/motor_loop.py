@@ -312,6 +312,8 @@ class MotorLoop:
 
 _SWITCHING = 2e-4
 """Time after which Python lets another thread run [s]; its default is five periods of the bus."""
+_TIMED_CYCLES = 256
+"""The number of last cycles of which is known when they were done."""
 
 
 class MotorThread:
@@ -331,6 +333,7 @@ class MotorThread:
         self._stop = threading.Event()
         self._cycle = threading.Condition()
         self._done = 0
+        self._done_at = [0] * _TIMED_CYCLES
         self._commanded = time.monotonic()
         self._thread = threading.Thread(target=self._run, name="aloft motors", daemon=True)
         self._switching = sys.getswitchinterval()
@@ -339,6 +342,12 @@ class MotorThread:
     def done(self) -> int:
         """The cycles so far."""
         return self._done
+
+    def done_at(self, cycle: int) -> int:
+        """Return when one of the last cycles was done, by ``time.perf_counter_ns``; zero if it was
+        not, or too long ago."""
+        behind = self._done - cycle
+        return self._done_at[cycle % _TIMED_CYCLES] if 0 <= behind < _TIMED_CYCLES else 0
 
     def start(self) -> None:
         """Begin."""
@@ -376,6 +385,7 @@ class MotorThread:
             loop.cycle()
             with self._cycle:
                 self._done += 1
+                self._done_at[self._done % _TIMED_CYCLES] = time.perf_counter_ns()
                 self._cycle.notify_all()
             following += period
             rest = following - time.monotonic()

@@ -1,7 +1,7 @@
 """The cost of the runtime: a chain of 20 small vector blocks beside a hand-written loop.
 
 Each filter of the chain computes y = 0.5 u + 0.5 x on vectors of 12 and then x' = y; the first reads
-ones. Other frameworks run the same chain where they are installed (``pip install aloft-robotics[peers]``):
+ones. Other frameworks run the same chain where they are installed (the extra ``peers``):
 they do its arithmetic with NumPy in Python blocks, which is how their users would write a block of
 their own. Whoever runs the chain must get the same bits as the hand-written loop.
 """

@@ -20,8 +20,6 @@ from pathlib import Path
 from rich.console import Console
 
 from aloft import LoadError, load
-from aloft.cli.shared.output import say
-from aloft.cli.shared.run_graph import print_result
 from aloft.cli.shared.running_graphs import path_of
 from aloft.extensions.studio.diagram.diagram import diagram
 from aloft.extensions.studio.diagram.layout import draw
@@ -165,16 +163,11 @@ def main() -> None:
     graph = load(JUMP)
     with tempfile.TemporaryDirectory() as folder:
         recording = Path(folder) / "jump.rrd"
-        result = graph.run(sinks=[Recorder(recording)])
+        graph.run(sinks=[Recorder(recording)])
         try:
             save_view(recording, THRUST, FOLDER / "jump.png")
         except (ViewerError, TimeoutError) as error:
             print(f"warning: docs/jump.png is the old one: {error}")
-    out = console(90)
-    print_result(out, graph.checked.name, result)
-    say(out, f"{'success' if result.success else 'no success'}: {result.reason}")
-    save(out, "run.svg", "aloft run graphs/jump.yaml")
-
     drawing = draw(diagram(graph.checked))
     (FOLDER / "graph.svg").write_text(svg(drawing, "the graph of graphs/jump.yaml"))
 

@@ -1,4 +1,4 @@
-"""Writes what is generated in README and in the pages under docs/.
+"""Writes what is generated in the pages under docs/.
 
 ::
 
@@ -37,10 +37,7 @@ from result_tables import (
     quarter_table,
     ratio_table,
     real_table,
-    results_sentence,
     results_table,
-    short_tasks_table,
-    short_tick_table,
     table,
     tasks_table,
     tick_tables,
@@ -49,6 +46,7 @@ from result_tables import (
 
 from aloft.extensions.commissioning.reach.reach import BRUCE, beside
 from aloft.lab.benchmarks.tick.chart import tick_chart
+from aloft.planner.task.boundary_set import BoundarySet
 from aloft.planner.task.margins import Margins
 from aloft.planner.task.sequence import Hop, KnownStairs, PhaseSpec, RoughGround
 from aloft.planner.task.task import JumpTask, Knots, Weights
@@ -58,7 +56,7 @@ from aloft.runtime.language.parameters import Parameters
 from aloft.studies.batch.seeds import run_seeds
 
 ROOT = Path(__file__).parents[2]
-DOCS, README = ROOT / "docs", ROOT / "README.md"
+DOCS = ROOT / "docs"
 
 
 def refresh(page: Path, mark: str, text: str, of: str = "") -> None:
@@ -117,9 +115,10 @@ def refreshed_excerpt(match: re.Match[str]) -> str:
 
 
 def write_excerpts() -> None:
-    """Write README's excerpts of files; tests/test_docs.py finds one that has fallen behind."""
-    text = README.read_text(encoding="utf-8")
-    README.write_text(EXCERPT.sub(refreshed_excerpt, text), encoding="utf-8")
+    """Write the pages' excerpts of files; tests/test_docs.py finds one that is out of date."""
+    for page in DOCS.glob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        page.write_text(EXCERPT.sub(refreshed_excerpt, text), encoding="utf-8")
 
 
 def write_faults(file: Path) -> None:
@@ -152,11 +151,9 @@ def write_landing(*files: Path) -> None:
 
 
 def write_results() -> None:
-    """Write the results of the standard trial's reported seeds, which are run for it, and README's
-    sentence."""
+    """Write the results of the standard trial's reported seeds, which are run for it."""
     rows = list(run_seeds(ROOT / "graphs" / "jump.yaml", [], SEEDS))
     refresh(DOCS / "results.md", "results", results_table(rows))
-    refresh(README, "results", results_sentence(rows))
 
 
 URDF = "package://example-robot-data/robots/go1_description/urdf/go1.urdf"
@@ -213,6 +210,7 @@ def task_parameter_tables() -> str:
         ("`knots`", Knots),
         ("`weights`", Weights),
         ("`margins`", Margins),
+        ("`bounds`", BoundarySet),
     ):
         head = f"{title}:\n\n" if title else ""
         names = ("parameter", "unit", "default", "bounds", "")
@@ -256,10 +254,9 @@ def write_task_parameters() -> None:
 
 
 def write_tasks(file: Path) -> None:
-    """Write the tasks that BRUCE was tried on, and some of them in README."""
+    """Write the tasks that BRUCE was tried on."""
     summary = read_json(file)
     refresh(DOCS / "results.md", "tasks", tasks_table(summary))
-    refresh(README, "tasks", short_tasks_table(summary))
 
 
 def write_robots_results(file: Path) -> None:
@@ -333,10 +330,9 @@ def write_export(file: Path) -> None:
 
 
 def write_tick(file: Path) -> None:
-    """Write the duration of a tick, with a picture, and some of it in README."""
+    """Write the duration of a tick, with a picture."""
     found = read_json(file)
     refresh(DOCS / "compiled.md", "tick", tick_tables(found))
-    refresh(README, "tick", short_tick_table(found))
     (DOCS / TICK_PICTURE).write_text(tick_chart(found["rows"]), encoding="utf-8")
 
 

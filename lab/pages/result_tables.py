@@ -251,33 +251,12 @@ def results_table(rows: Sequence[SeedRow]) -> str:
     )
 
 
-def results_sentence(rows: Sequence[SeedRow]) -> str:
-    """Format the number of seeds that succeeded, and the median of the first figure."""
-    name, text, scale, unit, goal = FIGURES[0]
-    middle = median(row.metrics[name] * scale for row in rows if name in row.metrics)
-    return (
-        f"{_successes(rows)}, with an {text} of {middle:.3g} {unit} in the median (goal {goal}).\n"
-    )
-
-
 def _successes(rows: Sequence[SeedRow]) -> str:
     successes = sum(row.success for row in rows)
     seeds = f"seeds {SEEDS[0]} to {SEEDS[-1]}"
     return f"Jump on the spot, {seeds}: **{successes} of {len(rows)} succeed**"
 
 
-README_TASKS = (
-    "in situ, 18 cm above standing",
-    "forward 38 cm",
-    "backward 12 cm",
-    "sideways 20 cm",
-    "turn 60 deg",
-    "step up 8 cm",
-    "step down 15 cm",
-    "beyond, forward 60 cm",
-    "push 100 N forward",
-)
-"""The tasks that the README shows in any case."""
 TASKS_HEAD = ("task", "succeeded", "95 % interval", "goal")
 
 
@@ -320,37 +299,12 @@ def mutated_robots_table(rows: Sequence[Row]) -> str:
     )
 
 
-def short_tasks_table(summary: Row) -> str:
-    """Format the number of tasks that met their goal, the rows of ``README_TASKS``, and those of
-    all that did not.
-
-    Raises:
-        ValueError: the summary lacks a task of ``README_TASKS``.
-    """
-    rows: Sequence[Row] = summary["rows"]
-    if lacking := [name for name in README_TASKS if name not in {row["task"] for row in rows}]:
-        raise ValueError(f"the summary has no task {lacking[0]!r}, which the README shows")
-    met = sum(row["met"] for row in rows)
-    shown = [row for row in rows if row["task"] in README_TASKS or not row["met"]]
-    return (
-        f"{met} of {len(rows)} tasks and pushes met their goal. Some of these, and all that missed it:\n\n"
-        + table(TASKS_HEAD, map(_task, shown))
-    )
-
-
 def _task(row: Row) -> Sequence[str]:
     goal = f"{percent(row['goal'])}, {'met' if row['met'] else 'missed'}"
     return (row["task"], succeeded(row), interval(row), goal)
 
 
 TICK_PICTURE = "tick.svg"
-README_TICK = (
-    "controller, fused, beside OSQP",
-    "whole-body program, beside DAQP",
-    "state to torque, beside TSID",
-    "busy-wait loop, period",
-)
-"""The rows that the README shows in any case."""
 TICK_HEAD = ("", "median", "as many times as fast as", "times", "floor", "goal", "")
 REACHED, FLOOR, MISSED = "goal reached", "floor reached", "missed"
 
@@ -414,25 +368,6 @@ def _outcome(row: Row) -> str:
     if row["met"] is False and row["floor"] is not None and measured <= row["floor"]:
         return FLOOR
     return {True: REACHED, False: MISSED, None: ""}[row["met"]]
-
-
-def short_tick_table(found: Row) -> str:
-    """Format the picture, the number of goals reached, the rows of ``README_TICK``, and all missed
-    ones."""
-    rows = [row for row in found["rows"] if row["goal"] is not None]
-    outcomes = [_outcome(row) for row in rows]
-    shown = [
-        row
-        for row, outcome in zip(rows, outcomes, strict=True)
-        if row["name"] in README_TICK or outcome == MISSED
-    ]
-    reached, floor, missed = (outcomes.count(each) for each in (REACHED, FLOOR, MISSED))
-    return (
-        f"![The blocks of one tick beside its peers](docs/{TICK_PICTURE})\n\n"
-        f"Of {len(rows)} rows with a goal {reached} reach it, {floor} reach only their floor, and {missed} "
-        "miss both. Some of these, and all that miss both:\n\n"
-        + table(TICK_HEAD, map(_ratio, shown))
-    )
 
 
 ARMS = ("simulation", "twin")

@@ -1,7 +1,6 @@
 """The table and the picture of one tick, from what ``aloft bench tick --json`` prints."""
 
 from collections.abc import Callable
-from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -9,8 +8,6 @@ import pytest
 from aloft.lab.benchmarks.rows import Row
 from aloft.lab.benchmarks.tick.chart import tick_chart
 
-ROOT = Path(__file__).parents[2]
-PAGE, README = ROOT / "docs" / "compiled.md", ROOT / "README.md"
 ROWS = [
     Row("block wbc", 20.0, "us/tick"),
     Row("block legs", 10.0, "us/tick"),
@@ -49,30 +46,6 @@ def test_the_table_of_a_benchmark_without_blocks(script: ModuleType) -> None:
     assert page.startswith("Quick, 2 cores, Python 3.11; load before 0.5, after 0.75. Ratios bear")
     assert "| controller, fused | 30 us | OSQP | 25 | 20 | 30 | floor reached |" in page
     assert "| block wbc | 20 us |" in page
-
-
-def test_readme_has_its_rows_and_all_that_miss_their_goal(script: ModuleType) -> None:
-    one, *_ = script.README_TICK
-    rows = [
-        *ROWS,
-        Row(one, 30.0, "us/tick", "OSQP", 0.01, 1 / 30, floor=1 / 20),
-        Row("process", 2.0, "s", "real time", 0.9, 1 / 5, floor=1 / 2),
-    ]
-    table = script.short_tick_table({**FOUND, "rows": [row.to_json() for row in rows]})
-    assert "![The blocks of one tick beside its peers](docs/tick.svg)" in table
-    assert "Of 4 rows with a goal 1 reach it, 2 reach only their floor, and 1 miss both." in table
-    assert f"| {one} | 30 us | OSQP | 100 | 20 | 30 | goal reached |" in table
-    assert "| process | 2 s | real time | 1.11 | 2 | 5 | missed |" in table
-    assert all(row.name not in table for row in ROWS if row.name != "controller, fused")
-    assert "| controller, fused |" not in table
-    page = README.read_text()
-    assert page.count("<!-- tick -->") == page.count("<!-- end of tick -->") == 1
-
-
-def test_the_rows_of_readme_were_measured(script: ModuleType) -> None:
-    for name in script.README_TICK:
-        assert f"| {name} |" in PAGE.read_text()
-        assert f"| {name} |" in README.read_text()
 
 
 def test_an_earlier_commit_has_other_blocks(script: ModuleType) -> None:

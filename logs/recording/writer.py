@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.run_result import RunResult
 from ...runtime.running.sink import Note, parameter_note
+from ..file.code import code_of, remember
 from ..file.format import BUS, HELD, KEYFRAMES, PACKED, ROWS, STATE, Header, spans, time_columns
 from ..file.header import make_header
 from ..file.held_fields import split_bus
@@ -354,6 +355,8 @@ def write_recording(path: str | PathLike[str], result: RunResult) -> Recording:
     start = rows[0].tobytes() if len(rows) else bytes(log.layout.size)
     first = log.ticks[0] if log.ticks else 0
     header = make_header(result.graph, log.layout, start, first_tick=first)
+    if result.graph.resolved is not None:
+        remember(code_of(result.graph.resolved, result.graph.robot))
     writer = RecordingWriter(path, header, result.run_hash)
     try:
         writer.write_rows(ticks, rows)

@@ -9,7 +9,7 @@ version. Where any of these differs, no entry has the name, and the kernel is co
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -46,7 +46,8 @@ def load(kernel: Callable[..., Any], signature: tuple[ArgumentType, ...]) -> byt
     from zipfile import BadZipFile
 
     try:
-        return store.unsealed(archive.read(_name(kernel, signature, triple)))
+        name = _name(kernel, signature, triple)
+        return store.unsealed(name, archive.read(name))
     except (KeyError, OSError, BadZipFile):
         return None
 
@@ -84,12 +85,11 @@ def write(kernels: Iterable[Kernel], triple: str, folder: Path = FOLDER) -> Path
     from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
     translator = Translator()
-    made: Mapping[str, bytes] = {
-        _name(kernel, signature, triple): store.sealed(
-            cross_compiled(translator.module(kernel, signature), triple, OLDEST[triple])
-        )
-        for kernel, signature in kernels
-    }
+    made: dict[str, bytes] = {}
+    for kernel, signature in kernels:
+        name = _name(kernel, signature, triple)
+        code = cross_compiled(translator.module(kernel, signature), triple, OLDEST[triple])
+        made[name] = store.sealed(name, code)
     file = folder / f"{triple}.zip"
     with ZipFile(file, "w", ZIP_DEFLATED) as archive:
         for name in sorted(made):

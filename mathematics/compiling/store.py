@@ -1,69 +1,41 @@
-"""The cache of machine code in the user's cache folder: one file for each kernel and its types.
-
-Files are written under another name and renamed, so two processes that compile the same kernel at
-once both succeed. A file that is damaged is not used, and is written again.
-"""
+"""The cache of machine code: one file for each kernel and its types; see ``files.cache``."""
 
 from __future__ import annotations
 
-import hashlib
-import os
-import tempfile
-from contextlib import suppress
 from pathlib import Path
 
-_DIGEST = 16
+from ...files.cache import Cache, sealed, unsealed
+
+__all__ = ["cache_folder", "holds", "load", "save", "sealed", "unsealed"]
+
+CACHE = Cache("kernels", ".o")
 
 
 def cache_folder() -> Path:
-    """Return the cache folder of machine code: ``aloft/kernels`` in the user's cache folder."""
-    root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(root) / "aloft" / "kernels"
+    """Return the cache folder of machine code.
+
+    Raises:
+        OSError: the user has no home.
+    """
+    if CACHE.folder is None:
+        raise OSError("this user has no home folder to keep machine code in")
+    return CACHE.folder
 
 
 def load(name: str) -> bytes | None:
-    """Load the machine code called ``name``; ``None`` where there is none or it is damaged."""
-    try:
-        content = _place(name).read_bytes()
-    except OSError:
-        return None
-    return unsealed(content)
+    """Load the machine code called ``name``; ``None`` where there is none that may be used."""
+    return CACHE.load(_place(name))
 
 
 def holds(name: str) -> bool:
     """Return whether there is a file for the machine code called ``name``."""
-    return _place(name).is_file()
+    return CACHE.holds(_place(name))
 
 
 def save(name: str, code: bytes) -> None:
     """Keep machine code; where the folder cannot be written it is simply not kept."""
-    place = _place(name)
-    with suppress(OSError):
-        place.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=place.parent, suffix=".part")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(sealed(code))
-            os.replace(temporary, place)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
+    CACHE.save(_place(name), code)
 
 
-def _place(name: str) -> Path:
-    return cache_folder() / name[:2] / f"{name[2:]}.o"
-
-
-def sealed(code: bytes) -> bytes:
-    """Machine code behind its checksum."""
-    return _checksum(code) + code
-
-
-def unsealed(content: bytes) -> bytes | None:
-    """Return the machine code behind its checksum, or ``None`` where that does not fit."""
-    checksum, code = content[:_DIGEST], content[_DIGEST:]
-    return code if _checksum(code) == checksum else None
-
-
-def _checksum(code: bytes) -> bytes:
-    return hashlib.blake2b(code, digest_size=_DIGEST).digest()
+def _place(name: str) -> str:
+    return f"{name[:2]}/{name[2:]}"

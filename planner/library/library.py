@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ...files.cache import cache_root, trusted_file
 from ...robots.description import RobotDescription
 from ..task.files import PlanError
 from ..task.plan import (
@@ -69,9 +70,8 @@ Solver = Callable[[JumpTask, RobotDescription, PlannedJump | None], PlannedJump]
 
 
 def user_folder() -> Path:
-    """Return the folder of a user's own plans."""
-    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(home) / "aloft" / "plans"
+    """Return the folder of a user's own plans; for a user without a home, one that is not there."""
+    return (cache_root() or Path(os.devnull)) / "plans"
 
 
 def task_distance(first: JumpTask, second: JumpTask) -> float | None:
@@ -159,7 +159,7 @@ class PlanLibrary:
         """Return the file of the plan of exactly this task, or ``None``."""
         for folder in self._folders:
             found = sorted(folder.glob(f"*-{task.hash(self.robot)}.npz"))
-            if found:
+            if found and _may_be_used(found[0]):
                 return found[0]
         return None
 
@@ -192,15 +192,22 @@ class PlanLibrary:
     def find(self, task: JumpTask) -> PlannedJump | None:
         """Return the plan of exactly this task, or ``None``.
 
+        Of the user's own folder, a damaged file and one that holds another task's plan count as none.
+
         Raises:
-            PlanFileError: its file is damaged; the message names it.
+            PlanFileError: a file elsewhere is such; the message names it.
         """
         path = self.path_of(task)
         if path is None:
             return None
         try:
-            return read_plan(path)
+            plan = read_plan(path)
+            if plan.task.hash(self.robot) != task.hash(self.robot):
+                raise PlanFileError(f"{path} holds the plan of another task")
+            return plan
         except PlanFileError as error:
+            if path.parent == user_folder():
+                return None
             raise PlanFileError(
                 f"{error}; put the file back, or remove it to have the task planned anew"
             ) from error
@@ -348,8 +355,18 @@ class PlanLibrary:
                 return kept, True
         near = None if anew else self.nearest(task)
         plan = solve_and_check(task, self.robot, near[0] if near else None, solve)
-        self.add(plan)
+        try:
+            self.add(plan)
+        except OSError:
+            if self.folder != user_folder():
+                raise
+            # a home that is missing or read-only: planned again the next time
         return plan, False
+
+
+def _may_be_used(path: Path) -> bool:
+    """Return whether a plan's file may be read: in the user's own folder it must be this user's only."""
+    return path.parent != user_folder() or trusted_file(path)
 
 
 _headers: dict[Path, tuple[tuple[int, int, int], dict[str, Any] | None]] = {}

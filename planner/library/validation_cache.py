@@ -14,16 +14,14 @@ cache; a note that cannot be read or written costs time and nothing else.
 from __future__ import annotations
 
 import hashlib
-import os
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from pathlib import Path
 from typing import Generic, TypeVar
 
+from ...files.cache import Cache
 from ...mathematics.kept_arrays import code_digest, kept_arrays
 from ...robots.robot_description import RobotDescription
 from ..checking.validity import require_valid
-from ..task.files import write_whole
 from ..task.plan import ARRAYS, PlannedJump
 from .jump_table import JumpTable
 from .reference_table import reference_table
@@ -32,10 +30,8 @@ FOLDERS = ("planner/checking", "planner/models", "planner/task", "robots", "math
 """The code that decides what the check finds."""
 
 
-def notes_folder() -> Path:
-    """Return the folder of the notes that a plan has passed."""
-    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(home) / "aloft" / "checked"
+NOTES = Cache("checked")
+"""Notes that a plan has passed: files with no content but their digest."""
 
 
 def check_unless_noted(content: bytes, check: Callable[[], None]) -> None:
@@ -45,14 +41,10 @@ def check_unless_noted(content: bytes, check: Callable[[], None]) -> None:
         content: a digest of the plan and of the robot.
         check: raises an error if the plan does not pass; then nothing is noted.
     """
-    note = notes_folder() / hashlib.blake2b(content + _code(), digest_size=16).hexdigest()
-    if note.is_file():
-        return
-    check()
-    try:
-        write_whole(note, b"")
-    except OSError:
-        return
+    note = hashlib.blake2b(content + _code(), digest_size=16).hexdigest()
+    if NOTES.load(note) is None:
+        check()
+        NOTES.save(note, b"")
 
 
 def _code() -> bytes:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import shutil
 import subprocess
 import tempfile
@@ -21,6 +20,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from ...files.cache import Cache, make_folders
 from ...robots.description import RobotDescription
 from ..models.coordinates import Coordinates
 from ..models.symbolic_model import SymbolicModel
@@ -55,10 +55,8 @@ Progress = Callable[[str, int, int], None]
 """Called with what is being done, steps done and steps in all."""
 
 
-def cache_folder() -> Path:
-    """Return the folder of compiled libraries: the user's cache directory."""
-    root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(root) / "aloft" / "planner"
+LIBRARIES = Cache("planner", ".so")
+"""The compiled libraries, each under the hash of its content and its piece's name."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +141,7 @@ def _load(
     waiting, elsewhere = deque(names), 0
     while waiting:
         name = waiting.popleft()
-        library = cache_folder() / key / f"{name}.so"
+        library = f"{key}/{name}"
         # What another process is compiling comes last, when there is nothing else to do but wait.
         with _claimed(library, compiler, wait=elsewhere > len(waiting)) as ours:
             if not ours:
@@ -151,22 +149,24 @@ def _load(
                 elsewhere += 1
                 continue
             elsewhere = 0
-            usable = compiled and library.is_file()
-            if not usable and progress is not None:
+            kept = LIBRARIES.loadable(library) if compiled else None
+            if kept is None and progress is not None:
                 how = "compiling" if compiler else "building"
                 progress(f"{how} the {functions.name} {name} functions", len(pieces), len(names))
-            piece = None if usable else functions.make(name)
-            if piece is not None and compiler is not None:
-                usable = _compile(compiler, piece, library)
-        prefix = f"{functions.name}_{name}"
-        pieces[name] = _external(library, prefix) if usable or piece is None else piece
+            piece = None if kept is not None else functions.make(name)
+            if piece is not None and compiler is not None and _compile(compiler, piece, library):
+                kept = LIBRARIES.loadable(library)
+        if kept is not None:
+            pieces[name] = _external(kept, f"{functions.name}_{name}")
+        elif piece is not None:
+            pieces[name] = piece
     if progress is not None:
         progress(f"{functions.name} functions ready", len(names), len(names))
     return pieces
 
 
 @contextmanager
-def _claimed(library: Path, compiler: str | None, *, wait: bool) -> Iterator[bool]:
+def _claimed(library: str, compiler: str | None, *, wait: bool) -> Iterator[bool]:
     """Claim a missing library for this process, so that no two make the same; yield whether it is this one's to make.
 
     With ``wait`` it becomes so when the other process is done or has died. Where files cannot be
@@ -175,10 +175,10 @@ def _claimed(library: Path, compiler: str | None, *, wait: bool) -> Iterator[boo
     try:
         import fcntl
 
-        missing = compiler is not None and not library.is_file()
-        if missing:
-            library.parent.mkdir(parents=True, exist_ok=True)
-        lock = library.with_suffix(".lock").open("w") if missing else None
+        path = LIBRARIES.path(library)
+        missing = compiler is not None and LIBRARIES.loadable(library) is None
+        claims = missing and path is not None and make_folders(path.parent)
+        lock = path.with_suffix(".lock").open("w") if claims and path is not None else None
     except (ImportError, OSError):
         lock = None
     if lock is None:
@@ -206,36 +206,24 @@ def find_compiler() -> str | None:
     return next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
 
 
-def _compile(compiler: str, piece: StageFunction, library: Path) -> bool:
-    """Compile a piece; whether that worked."""
+def _compile(compiler: str, piece: StageFunction, library: str) -> bool:
+    """Compile a piece and keep the library under that name; whether that worked."""
     import casadi as ca
 
+    name = library.rpartition("/")[2]
     try:
-        with made_aside(library) as made:
-            generator = ca.CodeGenerator(f"{library.stem}.c")
+        with tempfile.TemporaryDirectory() as folder:
+            made = Path(folder) / f"{name}.so"
+            generator = ca.CodeGenerator(f"{name}.c")
             for kind in KINDS:
                 generator.add(getattr(piece, kind))
             generator.generate(f"{made.parent}/")
             short = sum(getattr(piece, kind).n_instructions() for kind in KINDS) < LONG
-            flags = () if short and library.stem in OPTIMISED else ("-O0",)
+            flags = () if short and name in OPTIMISED else ("-O0",)
             run_compiler(compiler, made.with_suffix(".c"), made, *flags)
+            return LIBRARIES.save(library, made.read_bytes())
     except (OSError, subprocess.CalledProcessError):
         return False
-    return True
-
-
-@contextmanager
-def made_aside(library: Path) -> Iterator[Path]:
-    """Make a library in a folder apart and move it to its place at the end: other processes see the whole one or none.
-
-    Raises:
-        OSError: the folder cannot be written.
-    """
-    library.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
-        made = Path(folder) / library.name
-        yield made
-        made.replace(library)
 
 
 def run_compiler(compiler: str, source: Path, library: Path, *flags: str) -> None:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ...files.cache import cache_root, make_folders
 from ...files.document import read_value
 from ...files.nodes import ListNode, MapNode, Node, plain
 from ...files.problems import Position, Problems
@@ -109,11 +110,21 @@ ABANDONED = 3600.0
 
 
 def write_whole(path: Path, data: bytes) -> Path:
-    """Write a file, replacing what is there: readers see the old one or the new one, never half."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """Write a file, replacing what is there: readers see the old one or the new one, never half.
+
+    In the user's cache folder the file and its folders are this user's only, else they would not be used.
+    """
+    root = cache_root()
+    private = root is not None and root in path.parents
+    if private:
+        make_folders(path.parent)
+    else:
+        path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with part.open("wb") as file:
+            if private:
+                part.chmod(0o600)
             file.write(data)
             file.flush()
             os.fsync(file.fileno())

@@ -3,7 +3,7 @@
 Bodies that no joint moves become part of the body they are fixed to, and every link's frame is put
 at its joint and turned parallel to the base's at the zero of all joints, so that joint axes may
 point anywhere. A body with several joints becomes several links: each but the last is given a
-thousandth of the body, because a link has a mass; together they are the body at the zero pose.
+millionth of the body, because a link has a mass; together they are the body at the zero pose.
 So is a link without mass given a thousandth of what it carries, if that has any. Else it becomes part of
 what carries it. A link with a mass and no inertia is a ball of it, of the density of water.
 """
@@ -26,6 +26,18 @@ from .raw_model import Inertial, RawBody, RawJoint, RawModel, joined
 GROUND = "ground"
 """The base link of a robot that is bolted to the world by a file's own world body."""
 SHARE = 1e-3
+"""Share of what it carries that a link without mass has."""
+SPLIT = 1e-6
+"""Share of a body with several joints that each of its links but the last has; of light ones ``SHARE``."""
+LIGHTEST, ROUNDEST = 1e-11, 1e-12
+"""The least mass [kg] and inertia [kg m^2] of such a link, with which simulators compute."""
+
+
+def split_share(body: Inertial) -> float:
+    """Return the share of a body with several joints that each of its links but the last has."""
+    least = float(np.linalg.eigvalsh(body.inertia)[0])
+    heavy = SPLIT * body.mass > LIGHTEST and SPLIT * least > ROUNDEST
+    return SPLIT if heavy else SHARE
 
 
 @dataclass(frozen=True)
@@ -64,6 +76,8 @@ class LinkTree:
     raw_joints: Mapping[str, RawJoint]
     frames: Mapping[str, BodyFrame]
     notes: tuple[str, ...] = ()
+    balls: tuple[str, ...] = ()
+    """Links without an inertia in the file, which are balls."""
 
 
 def tidy(values: Any, digits: int = 11) -> list[float]:
@@ -93,13 +107,17 @@ def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -
     frames = {start.name: BodyFrame(start.name, np.eye(3), np.zeros(3))}
     joints: list[dict[str, Any]] = []
     raw: dict[str, RawJoint] = {}
+    parts: set[str] = set()
+    beside: list[str] = []
     for body in model.bodies.values():
         if body.name == start.name:
             continue
         parent = start.name if body.parent == model.world and root == GROUND else body.parent
         if parent not in frames:
-            continue  # A thing beside the robot.
+            beside.append(body.name)
+            continue
         moving = [joint for joint in body.joints if joint.name not in still]
+        share = split_share(body.inertial) if len(moving) > 1 else 0.0
         rotation, position = turn.T @ body.rotation, turn.T @ (body.position - place)
         carrier = links[frames[parent].link]
         for k, joint in enumerate(moving):
@@ -108,8 +126,10 @@ def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -
             anchor = turn.T @ (joint.anchor - place)
             link = links[name] = BuiltLink(name, anchor)
             if not last:
-                piece = body.inertial.scaled(SHARE)
+                piece = body.inertial.scaled(share)
                 link.bodies.append(piece.moved(rotation, position - anchor))
+                if body.inertial.mass >= NO_MASS:
+                    parts.add(name)
             limits = None if joint.limits is None else list(joint.limits)
             joints.append({
                 "name": joint.name, "kind": joint.kind, "parent": carrier.name, "child": name,
@@ -119,7 +139,7 @@ def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -
             raw[joint.name] = joint
             carrier = link
         pieces = max(len(moving) - 1, 0)
-        inertial = body.inertial.scaled(1.0 - SHARE * pieces) if pieces else body.inertial
+        inertial = body.inertial.scaled(1.0 - share * pieces) if pieces else body.inertial
         frame = BodyFrame(carrier.name, rotation, position - carrier.origin)
         frames[body.name] = frame
         carrier.bodies.append(inertial.moved(frame.rotation, frame.position))
@@ -127,7 +147,7 @@ def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -
     moving_links = {
         n: link for n, link in links.items() if n != start.name or found_joint != "fixed"
     }
-    bare, notes = _complete_links(moving_links, joints)
+    bare, balls, notes = _complete_links(moving_links, joints, parts)
     if bare:
         tree = build(model, [*welded, *bare.values()], base_joint)
         merged = [
@@ -138,8 +158,13 @@ def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -
         return replace(tree, notes=(*merged, *tree.notes))
     return LinkTree(
         start.name, found_joint, [_link_data(link) for link in links.values()], joints, raw, frames,
-        tuple(notes),
+        (*notes, *_beside(beside)), tuple(balls),
     )  # fmt: skip
+
+
+def _beside(bodies: list[str]) -> list[str]:
+    """Return a note of bodies that hang on nothing of the robot."""
+    return [f"left out: bodies beside the robot: {listing(bodies, 6)}"] if bodies else []
 
 
 def _holder(tree: LinkTree, name: str) -> str:
@@ -156,14 +181,16 @@ WATER = 1000.0
 
 
 def _complete_links(
-    links: Mapping[str, BuiltLink], joints: list[dict[str, Any]]
-) -> tuple[dict[str, str], list[str]]:
-    """Give mass and inertia to links that have none. Returns those that carry none either, with the
-    joint that carries each, and notes of what was given."""
-    bare, notes = dict[str, str](), list[str]()
+    links: Mapping[str, BuiltLink], joints: list[dict[str, Any]], parts: Collection[str]
+) -> tuple[dict[str, str], list[str], list[str]]:
+    """Give mass and inertia to links that have none, but not to ``parts`` of a body. Returns those that carry none either, with the
+    joint that carries each, those that became balls, and notes of what was given."""
+    bare, balls, notes = dict[str, str](), list[str](), list[str]()
     carrier = {joint["child"]: joint["name"] for joint in joints}
     for name in reversed([*links]):
         link, whole = links[name], joined(links[name].bodies)
+        if name in parts:
+            continue
         if abs(whole.mass) < NO_MASS:
             behind = [j["child"] for j in joints if j["parent"] == name and j["child"] not in bare]
             heavy = next(
@@ -181,25 +208,39 @@ def _complete_links(
             radius = (3.0 * whole.mass / (4.0 * np.pi * WATER)) ** (1.0 / 3.0)
             ball = 0.4 * whole.mass * radius**2 * np.eye(3)
             link.bodies[:] = [Inertial(whole.mass, whole.com, ball)]
+            balls.append(name)
             notes.append(
                 f"link {name} has no inertia: it is a ball of its mass and of water's density here"
             )
-    return bare, notes[::-1]
+    return bare, balls, notes[::-1]
 
 
 def _base_of(model: RawModel, wanted: str) -> tuple[str, str, list[str]]:
     """Return the base's name (``GROUND`` for the world), how it is held, and joints that say just that."""
     roots = [body for body in model.bodies.values() if body.parent == model.world]
+
+    def has_joints(root: RawBody) -> bool:
+        within = {root.name}
+        for body in model.bodies.values():
+            if body.parent in within:
+                within.add(body.name)
+                if body.joints:
+                    return True
+        return False
+
     free = [body for body in roots if any(joint.kind == "free" for joint in body.joints)]
     others = [
         joint.name
         for body in model.bodies.values()
         for joint in body.joints
-        if joint.kind == "ball" or (joint.kind == "free" and body not in free)
+        if joint.kind == "ball"
+        or (joint.kind == "free" and body.name not in [f.name for f in free])
     ]
     if others:
         raise _error(model, f"joints {listing(others)} are no hinges or slides, which a robot's are",
                      "one axis each")  # fmt: skip
+    if len(free) > 1 and sum(map(has_joints, free)) == 1:
+        free = [body for body in free if has_joints(body)]  # the others are things beside it
     if len(free) > 1:
         names = listing([body.name for body in free])
         raise _error(

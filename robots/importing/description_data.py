@@ -23,8 +23,10 @@ from typing import Any
 import numpy as np
 
 from ...files.problems import listing
+from ..comparison.compare import compare_with_file
+from ..comparison.differences import Differences
 from ..robot_description import SLIDE_UNITS, Joint, Link, RobotDescription
-from ..validation import DescriptionError
+from ..validation import DescriptionError, RobotError, find_errors
 from ..validation.errors import nearest
 from ..validation.find_errors import shown
 from .build import BodyFrame, LinkTree, build, tidy
@@ -385,7 +387,8 @@ def located_in_model(
 @dataclass(frozen=True)
 class Imported:
     """Result of an import: the description's ``data``, the ``errors`` of the YAML, what the file lacks or what is
-    approximated in ``notes``, and the ``model`` and tree it was made from.
+    approximated in ``notes``, the ``model`` and tree it was made from, and the tree without the YAML's changes in
+    ``unchanged``.
     """
 
     data: dict[str, Any]
@@ -393,23 +396,49 @@ class Imported:
     notes: list[str]
     model: RawModel
     built: LinkTree
+    unchanged: LinkTree
+
+    def compared(self) -> list[Differences]:
+        """Compare what was read of the file with MuJoCo's and Pinocchio's own readings.
+
+        Raises:
+            RobotError: they differ; it carries every difference with both numbers.
+        """
+        links, joints = self.unchanged.links, self.unchanged.joints
+        changed = links != self.built.links or joints != self.built.joints
+        own = {**self.data, "links": links, "joints": joints, "standing": {}, "held": {}}
+        if changed and find_errors(own):
+            return []  # a file with faults that the YAML mends
+        found = compare_with_file(self.model, self.unchanged)
+        errors = [error for each in found for error in each.errors]
+        if errors:
+            raise RobotError(str(self.model.path), errors)
+        return found
 
 
-def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
+def import_robot(path: Path, added: Mapping[str, Any], model: RawModel | None = None) -> Imported:
     """Return the description that a URDF or MJCF file and a YAML's content make together.
+
+    Args:
+        path: of the file.
+        added: the YAML's content.
+        model: what the file holds, where it was read before.
 
     Raises:
         RobotError: the file cannot be read at all.
     """
-    model = read_model(path)
+    model = model or read_model(path)
     overlay = Overlay(added)
     overlay.check_keys(list(RobotDescription.model_fields))
     notes = [*model.notes, *odd_bodies(model)]
     joints = [joint.name for body in model.bodies.values() for joint in body.joints]
-    welded = [*overlay.welded(joints), *model.mimics]
+    welded = [*overlay.welded(joints), *model.held]
     base_joint = added.get("base_joint", "")
     built = build(model, welded, base_joint if isinstance(base_joint, str) else "")
     notes += built.notes
+    unchanged = replace(
+        built, links=[{**link} for link in built.links], joints=[{**each} for each in built.joints]
+    )
     overlay.change("links", built.links, Link)
     overlay.change("joints", built.joints, Joint)
     feet, contacts = overlay.feet(built)
@@ -434,8 +463,7 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
         data["points"] = {"torso_com": [built.base, list(base["com"])]}
     bodies = {name: body.look for name, body in model.bodies.items()}
     data["looks"] = link_looks(bodies, built.frames, path.parent)
-    known = {name: angle for name, angle in model.pose.items() if name in names}
-    data["standing"] = known
+    data["standing"] = _pose_within_limits(model.pose, built.joints, notes)
     data["sensors"] = {"imu": data["base_joint"] != "fixed", "switches": bool(contacts)}
     for key in ("profile", "sensors", "standing", "held", "supply", "looks"):
         if key in added:
@@ -443,7 +471,33 @@ def import_robot(path: Path, added: Mapping[str, Any]) -> Imported:
     if thrusters := overlay.thrusters(built, model):
         data["thrusters"] = thrusters
     _stand_within_limits(data)
-    return Imported(data, overlay.errors, notes, model, built)
+    return Imported(data, overlay.errors, notes, model, built, unchanged)
+
+
+ROUNDED = 1e-3
+"""Distance from a limit [rad, m] that rounding explains: degrees or radians that are written with a few digits."""
+
+
+def _pose_within_limits(
+    pose: Mapping[str, float], joints: list[dict[str, Any]], notes: list[str]
+) -> dict[str, float]:
+    """Return the key frame's positions of the robot's joints, each within its limits."""
+    found, far = {}, []
+    for joint in joints:
+        name, limits = joint["name"], joint["limits"]
+        if name not in pose:
+            continue
+        found[name] = angle = pose[name]
+        simple = isinstance(limits, list) and all(isinstance(v, (int, float)) for v in limits)
+        if simple and len(limits) == 2 and limits[0] < limits[1]:
+            found[name] = min(max(angle, limits[0]), limits[1])
+            if abs(found[name] - angle) > ROUNDED:
+                far.append(f"{name} at {angle:g} for {found[name]:g}")
+    if far:
+        notes.append(
+            f"the key frame is outside joint limits, and the pose ends at them: {listing(far, 6)}"
+        )
+    return found
 
 
 def _stand_within_limits(data: dict[str, Any]) -> None:

@@ -12,12 +12,13 @@ import os
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...files.problems import listing
 from ...mathematics.rotations import quaternions_of_matrices
+from ..comparison.differences import Differences, unread
 from ..plausible_size import wrong_size
 from ..robot_description import RobotDescription
 from ..validation import RobotError, find_errors
@@ -29,25 +30,37 @@ from .fit_to_ground import fit_to_ground
 from .raw_model import RawModel
 
 
-def new_yaml(file: Path, target: Path) -> tuple[str, list[str]]:
-    """Return the text of the YAML to be written to ``target``, and what the file lacks.
+class NewYaml(NamedTuple):
+    """A short YAML: its ``text``, what the file lacks or what was guessed in ``notes``, and how what was read compares with
+    other readings of the file."""
+
+    text: str
+    notes: list[str]
+    compared: list[Differences]
+
+
+def new_yaml(file: Path, target: Path) -> NewYaml:
+    """Return the YAML to be written to ``target``.
 
     Raises:
-        RobotError: the file describes no robot.
+        RobotError: the file describes no robot, or MuJoCo or Pinocchio reads another one in it.
     """
-    guessed, more = guess(import_robot(file, {}))
+    bare = import_robot(file, {})
+    guessed, more = guess(bare)
     feet, held = guessed["feet"], guessed["held"]
-    imported = import_robot(file, {"name": target.stem, **guessed})
+    imported = import_robot(file, {"name": target.stem, **guessed}, bare.model)
     errors = find_errors(imported.data)
     if errors:
         raise RobotError(str(file), _placed(imported, errors))
+    compared = imported.compared()
     robot = RobotDescription.model_validate(imported.data)
     robot, fitted = fit_to_ground(robot, False, imported.model.pose)
-    notes = [*more, *imported.notes, *fitted, *wrong_size(robot)]
+    notes = [*more, *imported.notes, *fitted, *wrong_size(robot), *unread(compared)]
     name = os.path.relpath(file, target.parent)
     estimated = not any(joint.rotor_inertia for joint in imported.built.raw_joints.values())
     sensors = _sensors(robot, imported.model, imported.built)
-    return yaml_text(Path(name).as_posix(), robot, feet, held, notes, estimated, sensors), notes
+    text = yaml_text(Path(name).as_posix(), robot, feet, held, notes, estimated, sensors)
+    return NewYaml(text, notes, compared)
 
 
 def guess(bare: Imported) -> tuple[dict[str, Any], list[str]]:
@@ -260,26 +273,50 @@ def _feet(feet: list[dict[str, Any]]) -> list[str]:
 
 def _profile(robot: RobotDescription, estimated: bool) -> list[str]:
     rated = robot.profiles["rated"]
-    keys = ("peak_torque", "corner_speed", "no_load_speed", "continuous_torque")
     lines = [
         "# From the file: peak torques (effort limits) and no-load speeds (speed limits). ASSUMED: the",
         "# torque falls from 0.6 of the no-load speed on, and two fifths of it can be held for long.",
         "# MISSING where zero: rotor inertia at the gearbox output, friction, damping. ESTIMATED where it",
         "# is in a comment: rotor inertia, from torque and speed. A value given here counts for all",
-        "# motors; `motors: {NAME or PATTERN: {peak_torque: ...}}` for some.",
+        "# motors, so those in which motors differ are in comments; `motors: {NAME or PATTERN:",
+        "# {peak_torque: ...}}` for some.",
         "profiles:",
         "  rated:",
     ]
-    values = {key: getattr(rated, key) for key in keys}
+    differ = {
+        key
+        for rating in rated.motors.values()
+        for key, value in rating.model_dump(exclude_none=True).items()
+    }
+    ratings = ("peak_torque", "corner_speed", "no_load_speed", "continuous_torque")
     if rated.motors:
-        lines.append("    # " + ", ".join(f"{key}: {number(v)}" for key, v in values.items()))
+        values = ", ".join(f"{key}: {number(getattr(rated, key))}" for key in ratings)
+        lines.append(f"    # {values}")
     else:
-        lines += [f"    {key}: {number(value)}" for key, value in values.items()]
+        lines += [f"    {key}: {number(getattr(rated, key))}" for key in ratings]
+    written = not rated.motors
     for key in ("rotor_inertia", "friction", "damping"):
-        # An estimate for each motor must not become one that counts for all.
-        mark = "# " if key == "rotor_inertia" and estimated and rated.rotor_inertia else ""
-        lines.append(f"    {mark}{key}: {number(getattr(rated, key))}")
+        value = number(getattr(rated, key))
+        # What is one joint's own, in the file or by an estimate, must not become one that counts for all.
+        if key in differ or (key == "rotor_inertia" and estimated and rated.rotor_inertia):
+            lines.append(f"    # {key}: {value}")
+            lines += [f"    #   {name}: {own}" for name, own in _own(robot, key)]
+        else:
+            written = True
+            lines.append(f"    {key}: {value}")
+    if not written:
+        lines[lines.index("  rated:")] = "  rated: {}"
     return lines
+
+
+def _own(robot: RobotDescription, key: str) -> list[tuple[str, str]]:
+    """Return what motors have that is not the value of most, by name."""
+    found = []
+    for name, rating in robot.profiles["rated"].motors.items():
+        value = getattr(rating, key)
+        if value is not None:
+            found.append((name, number(value)))
+    return found
 
 
 def _sensors(robot: RobotDescription, model: RawModel, built: LinkTree) -> list[str]:

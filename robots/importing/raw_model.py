@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -120,6 +121,22 @@ class RawBody:
 
 
 @dataclass(frozen=True)
+class Reference:
+    """MuJoCo's own compile of the file, with all bodies as they are written; ``spec`` is what was compiled.
+
+    Attributes:
+        model: the compiled model; ``None`` where MuJoCo compiles it in no way, and ``refused`` says why.
+        refused: what MuJoCo says of the file as it is; empty where it compiles it.
+        stand_ins: bodies that have hardly any mass in the model, since MuJoCo refuses what the file gives them.
+    """
+
+    spec: Any
+    model: Any
+    refused: str = ""
+    stand_ins: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class RawModel:
     """Bodies of a file but the world, each behind its parent, branch by branch.
 
@@ -133,7 +150,10 @@ class RawModel:
         pose: joint angles of the file's key frame ``home``, ``stand`` or its first; empty for none.
         thrusters: actuators that push at a place, by name.
         sensors: those that the file mounts on links, by name.
-        mimics: joints that the file ties to another one, or leaves no range.
+        held: where the file holds joints that it ties to another one, holds, or leaves no range [rad, m]; bodies beyond
+            are given with them there.
+        compiled: whether MuJoCo's compiler sets masses that the file does not give.
+        reference: MuJoCo's own compile of the file, with which the import is compared.
         notes: what could not be taken over, one sentence each.
     """
 
@@ -144,7 +164,9 @@ class RawModel:
     world: str
     names_world: bool
     pose: Mapping[str, float] = field(default_factory=dict)
-    mimics: tuple[str, ...] = ()
+    held: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     thrusters: Mapping[str, RawThruster] = field(default_factory=dict)
     sensors: Mapping[str, RawSensor] = field(default_factory=dict)
+    compiled: bool = False
+    reference: Reference | None = None

@@ -2,14 +2,13 @@
 
 MuJoCo compiles the file, so it handles defaults, alternative orientations, included files and
 degrees. Two things are taken out before: inertias, because MuJoCo refuses or changes impossible
-ones of links that are fixed to others (published files have such), and meshes, because it reads
+ones of links that are fixed to others (``inertials``), and meshes, because it reads
 only few formats and needs none here.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,14 +17,26 @@ import numpy as np
 from ...files.problems import listing
 from ...mathematics.arrays import Array
 from . import capsules as fit
+from .actuators import geared, motor_torque, servo_speed, thrusters
 from .file_sensors import file_sensors, unknown_sensors
 from .hulls import RawShape, of_points
+from .inertials import (
+    chosen,
+    compile_reference,
+    mujoco_remarks,
+    one_line,
+    replace_inertials,
+    tidy_directions,
+    unset_compiler,
+    written_inertials,
+)
 from .left_out import left_out
 from .left_out_urdf import left_out_of_urdf
 from .looks import NOTHING_SEEN, RawLook, RawMesh, hex_color, urdf_looks
 from .meshes import READABLE, mesh_triangles
 from .package_files import find_file
-from .raw_model import NOTHING, Inertial, RawBody, RawJoint, RawModel, RawThruster, full_tensor
+from .raw_model import RawBody, RawJoint, RawModel
+from .ties import held_positions, tie_notes, ties_of_mjcf, ties_of_urdf
 from .urdf_text import UrdfJoint, XmlFile, check_urdf, urdf_joints
 from .xacro_text import XACRO
 
@@ -46,43 +57,41 @@ def read_model(path: Path) -> RawModel:
     Raises:
         RobotError: it is no URDF and no MJCF, or MuJoCo cannot make sense of it.
     """
-    import mujoco
 
     file = XmlFile(path)
     if file.is_urdf:
         check_urdf(file)
-    try:
-        if path.suffix == XACRO:
-            spec = mujoco.MjSpec.from_string(file.content)
-        else:
-            spec = mujoco.MjSpec.from_file(str(path))
-    except (ValueError, RuntimeError) as error:
-        raise file.error(f"MuJoCo cannot read this: {_one_line(error)}") from error
-    notes: list[str] = []
-    _name_everything(spec, file.is_urdf)
+    notes, remarks = list[str](), list[str]()
+    with mujoco_remarks(remarks):
+        spec, untouched = _parsed(file), _parsed(file)
     _refuse_closed_loops(spec, file)
-    inertials = _take_inertials(spec, file.is_urdf)
-    meshes = _take_meshes(spec, path.parent, inertials, notes)
+    written = written_inertials(spec, file.is_urdf)
+    replace_inertials(spec, written)
+    meshes = _take_meshes(spec, path.parent, written)
+    _take_meshes(untouched, path.parent, written)
+    if written:
+        unset_compiler(spec)
     try:
-        model = spec.compile()
+        with mujoco_remarks(remarks):
+            bare = spec.compile()
     except (ValueError, RuntimeError) as error:
-        raise file.error(f"MuJoCo cannot compile this: {_one_line(error)}") from error
-    data = mujoco.MjData(model)
-    data.qpos[:] = 0.0
-    free, ball = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
-    for k in range(model.njnt):
-        kind, start = int(model.jnt_type[k]), int(model.jnt_qposadr[k])
-        if kind in (free, ball):
-            data.qpos[start + (3 if kind == free else 0)] = 1.0
-    mujoco.mj_kinematics(model, data)
+        raise file.error(f"MuJoCo cannot compile this: {one_line(error)}") from error
+    with mujoco_remarks(remarks):
+        reference = compile_reference(untouched, written, file.is_urdf)
+    # What the compiler derives from inertia, such as damping from a damping ratio, is right in the reference only.
+    model = bare if reference.model is None else reference.model
     limits = urdf_joints(file) if file.is_urdf else {}
     looks = urdf_looks(file) if file.is_urdf else {}
-    mimics = tuple(name for name, joint in limits.items() if joint.mimics)
-    for name in mimics:
-        notes.append(f"joint {name} mimics {limits[name].mimics} in the URDF and is fixed here")
-    still = tuple(name for name, joint in limits.items() if joint.range == "none")
-    for name in still:
-        notes.append(f"joint {name} has a range of 0 to 0 in the URDF and is fixed here")
+    pose = _key_frame(spec, model)
+    ties = ties_of_urdf(limits) if file.is_urdf else ties_of_mjcf(spec, model)
+    ranges = {
+        model.joint(j).name: (float(model.jnt_range[j][0]), float(model.jnt_range[j][1]))
+        for j in range(model.njnt)
+        if model.jnt_limited[j]
+    }
+    held = held_positions(ties, pose, ranges)
+    data = _placed(model, held)
+    notes += tie_notes(ties, held, file.is_urdf)
     for name, joint in limits.items():
         if joint.range == "free":
             notes.append(
@@ -94,24 +103,22 @@ def read_model(path: Path) -> RawModel:
                 notes.append(
                     f"joint {name} has a negative {what} limit in the URDF, {value:g}: it counts as none"
                 )
-    if file.is_urdf:
-        notes += left_out_of_urdf(file)
-    else:
-        tied = _tied_joints(spec)
-        mimics += tuple(tied)
-        for name, leader in tied.items():
-            notes.append(f"joint {name} {leader} in the file and is fixed here")
-        notes += left_out(model, spec)
+    notes += left_out_of_urdf(file) if file.is_urdf else left_out(model, spec)
     notes += unknown_sensors(model, file)
+    if not file.is_urdf:  # what it passes over in a URDF is read above
+        notes += [f"MuJoCo says of the file: {said}" for said in remarks]
     names = [model.body(k).name for k in range(model.nbody)]
-    bodies = {}
+    bodies, changed = {}, []
     for k in range(1, model.nbody):
+        inertial, is_changed = chosen(bare, k, written.get(names[k]), reference)
+        if is_changed:
+            changed.append(names[k])
         bodies[names[k]] = RawBody(
             names[k],
             names[model.body_parentid[k]],
-            _tidy(data.xmat[k].reshape(3, 3)),
+            tidy_directions(data.xmat[k].reshape(3, 3)),
             np.array(data.xpos[k]),
-            _inertial(model, k, inertials.get(names[k])),
+            inertial,
             tuple(
                 _joint(model, data, j, limits)
                 for j in range(model.njnt)
@@ -120,13 +127,51 @@ def read_model(path: Path) -> RawModel:
             tuple(_shapes(model, k, meshes, notes)),
             looks.get(names[k], NOTHING_SEEN) if file.is_urdf else _look(model, k, meshes),
         )
+    if changed:
+        notes.append(
+            f"masses and inertias of {listing(changed, 4)} are those that MuJoCo's compiler sets, not the written ones"
+        )
     name = spec.modelname or path.stem
-    pose, thrusters = _key_frame(model), _thrusters(model, notes)
+    pushing = thrusters(model, notes)
     names_world = not file.is_urdf or file.has("link", names[0])
     return RawModel(
-        name, path, file.is_urdf, bodies, names[0], names_world, pose, mimics + still,
-        tuple(dict.fromkeys(notes)), thrusters, file_sensors(model, file),
+        name, path, file.is_urdf, bodies, names[0], names_world, pose, held,
+        tuple(dict.fromkeys(notes)), pushing, file_sensors(model, file),
+        bool(changed) or not written, reference,
     )  # fmt: skip
+
+
+def _parsed(file: XmlFile) -> Any:
+    """Return the file as MuJoCo reads it, with a name for everything."""
+    import mujoco
+
+    try:
+        if file.path.suffix == XACRO:
+            spec = mujoco.MjSpec.from_string(file.content)
+        else:
+            spec = mujoco.MjSpec.from_file(str(file.path))
+    except (ValueError, RuntimeError) as error:
+        raise file.error(f"MuJoCo cannot read this: {one_line(error)}") from error
+    spec.compiler.fusestatic = False
+    _name_everything(spec, file.is_urdf)
+    return spec
+
+
+def _placed(model: Any, held: Mapping[str, float]) -> Any:
+    """Return the model's data with all joints at zero, but those that are held where they are held."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.0
+    free, ball = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
+    for k in range(model.njnt):
+        kind, start = int(model.jnt_type[k]), int(model.jnt_qposadr[k])
+        if kind in (free, ball):
+            data.qpos[start + (3 if kind == free else 0)] = 1.0
+        else:
+            data.qpos[start] = held.get(model.joint(k).name, 0.0)
+    mujoco.mj_kinematics(model, data)
+    return data
 
 
 def _refuse_closed_loops(spec: Any, file: XmlFile) -> None:
@@ -148,30 +193,6 @@ def _refuse_closed_loops(spec: Any, file: XmlFile) -> None:
         )
 
 
-def _tied_joints(spec: Any) -> dict[str, str]:
-    """Return the joints that an equality of MJCF ties to another one or to a value, and which."""
-    import mujoco
-
-    return {
-        eq.name1: f"follows {eq.name2}" if eq.name2 else "is held"
-        for eq in spec.equalities
-        if eq.type == mujoco.mjtEq.mjEQ_JOINT and eq.active
-    }
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
-
-
-def _tidy(values: Array) -> Array:
-    """Return directions without the rounding errors of angles such as 1.5707963: nearly straight ones are made
-    straight.
-    """
-    values = np.array(values, dtype=float)
-    nearest = np.round(values)
-    return np.where(np.abs(values - nearest) < 1e-10, nearest, values) + 0.0
-
-
 def _name_everything(spec: Any, is_urdf: bool) -> None:
     for k, body in enumerate(spec.bodies):
         body.name = body.name or f"body_{k}"
@@ -182,39 +203,8 @@ def _name_everything(spec: Any, is_urdf: bool) -> None:
         geom.name = f"geom/{k}" if is_urdf or not geom.name else geom.name
 
 
-def _take_inertials(spec: Any, is_urdf: bool) -> dict[str, tuple[float, Array]]:
-    """Take the inertials that the file gives out of the model: mass, tensor in the inertial frame.
-
-    Every one is replaced by a unit body at its place, which any compiler accepts.
-    """
-    import mujoco
-
-    spec.compiler.fusestatic = False
-    if (
-        not is_urdf
-        and spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
-    ):
-        return {}
-    found = {}
-    for body in spec.bodies[1:]:
-        if not body.explicitinertial and not is_urdf and len(body.geoms):
-            continue  # An MJCF body without an inertial has that of its shapes.
-        if not body.explicitinertial:
-            found[body.name] = (0.0, np.zeros((3, 3)))
-            body.ipos = [0.0, 0.0, 0.0]
-        elif math.isnan(body.fullinertia[0]):
-            found[body.name] = (float(body.mass), np.diag(body.inertia))
-        else:
-            found[body.name] = (float(body.mass), full_tensor(np.array(body.fullinertia)))
-        body.fullinertia = [math.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
-        body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
-    return found
-
-
-def _take_meshes(
-    spec: Any, folder: Path, inertials: dict[str, Any], notes: list[str]
-) -> dict[str, TakenMesh]:
-    """Take the meshes of bodies with an inertial out of the model, by geom."""
+def _take_meshes(spec: Any, folder: Path, inertials: Mapping[str, Any]) -> dict[str, TakenMesh]:
+    """Take the meshes of bodies with an inertial out of the model, by geom, and all that is only seen."""
     import mujoco
 
     kinds = mujoco.mjtGeom
@@ -242,22 +232,12 @@ def _take_meshes(
     for mesh in list(spec.meshes):
         if mesh.name not in needed:
             spec.delete(mesh)
+    for each in (*spec.sites, *spec.tendons):
+        each.material = ""
     for group in (spec.textures, spec.materials, spec.skins):
         for each in list(group):
             spec.delete(each)
     return found
-
-
-def _inertial(model: Any, k: int, taken: tuple[float, Array] | None) -> Inertial:
-    import mujoco
-
-    turn = np.zeros(9)
-    mujoco.mju_quat2Mat(turn, model.body_iquat[k])
-    rotation, position = _tidy(turn.reshape(3, 3)), np.array(model.body_ipos[k])
-    mass, tensor = taken or (float(model.body_mass[k]), np.diag(model.body_inertia[k]))
-    if mass == 0.0 and not np.any(tensor):
-        return NOTHING
-    return Inertial(mass, np.zeros(3), tensor).moved(rotation, position)
 
 
 def _joint(model: Any, data: Any, j: int, urdf: dict[str, UrdfJoint]) -> RawJoint:
@@ -271,8 +251,8 @@ def _joint(model: Any, data: Any, j: int, urdf: dict[str, UrdfJoint]) -> RawJoin
     }
     name, dof = model.joint(j).name, int(model.jnt_dofadr[j])
     lower, upper = (float(value) for value in model.jnt_range[j])
-    effort, speed = _motor_torque(model, j), _servo_speed(model, j)
-    rotor, drag = _geared(model, j, "armature"), _geared(model, j, "damping")
+    effort, speed = motor_torque(model, j), servo_speed(model, j)
+    rotor, drag = geared(model, j, "armature"), geared(model, j, "damping")
     free = False
     if name in urdf:
         effort, speed = urdf[name].effort, urdf[name].speed
@@ -280,7 +260,7 @@ def _joint(model: Any, data: Any, j: int, urdf: dict[str, UrdfJoint]) -> RawJoin
     return RawJoint(
         name,
         kinds[int(model.jnt_type[j])],
-        _tidy(data.xaxis[j]),
+        tidy_directions(data.xaxis[j]),
         np.array(data.xanchor[j]),
         (lower, upper) if model.jnt_limited[j] and not free else None,
         effort,
@@ -289,112 +269,6 @@ def _joint(model: Any, data: Any, j: int, urdf: dict[str, UrdfJoint]) -> RawJoin
         float(np.max(model.dof_damping[dof])) + drag,
         float(model.dof_frictionloss[dof]),
     )
-
-
-def _actuators_on(model: Any, j: int) -> list[int]:
-    """Return the MJCF actuators that drive a joint."""
-    import mujoco
-
-    on_joint = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
-    return [
-        k
-        for k in range(model.nactuator)
-        if int(model.actuator_trntype[k]) in on_joint and model.actuator_trnid[k][0] == j
-    ]
-
-
-def _geared(model: Any, j: int, what: str) -> float:
-    """Return the ``armature`` or ``damping`` of actuators, given at their side of the gear, at the joint."""
-    values = getattr(model, f"actuator_{what}")
-    return sum(
-        float(values[k]) * float(model.actuator_gear[k][0]) ** 2 for k in _actuators_on(model, j)
-    )
-
-
-def _servo_speed(model: Any, j: int) -> float:
-    """Return the largest speed [rad/s] that a velocity servo on a joint is commanded to; NaN without one."""
-    import mujoco
-
-    found = math.nan
-    for k in _actuators_on(model, j):
-        stiffness, damping = (float(value) for value in model.actuator_biasprm[k][1:3])
-        servo = (
-            int(model.actuator_biastype[k]) == int(mujoco.mjtBias.mjBIAS_AFFINE)
-            and stiffness == 0.0
-            and damping < 0.0
-        )
-        if servo and model.actuator_ctrllimited[k]:
-            ratio = abs(float(model.actuator_gainprm[k][0]) / damping)
-            most = ratio * float(np.max(np.abs(model.actuator_ctrlrange[k])))
-            found = float(np.fmax(found, most / abs(float(model.actuator_gear[k][0]) or 1.0)))
-    return found
-
-
-def _motor_torque(model: Any, j: int) -> float:
-    """Return the largest torque [N m] of the MJCF actuators on a joint; 0 without one, NaN if unlimited."""
-    import mujoco
-
-    found = 0.0
-    for k in _actuators_on(model, j):
-        gear, gain = abs(float(model.actuator_gear[k][0])), abs(float(model.actuator_gainprm[k][0]))
-        is_motor = int(model.actuator_biastype[k]) == int(mujoco.mjtBias.mjBIAS_NONE)
-        if model.actuator_forcelimited[k]:
-            torque = gear * float(np.max(np.abs(model.actuator_forcerange[k])))
-        elif is_motor and model.actuator_ctrllimited[k]:
-            torque = gear * gain * float(np.max(np.abs(model.actuator_ctrlrange[k])))
-        else:
-            torque = math.nan
-        found += torque
-    if model.jnt_actfrclimited[j] and found != 0.0:
-        return float(np.fmin(found, np.max(np.abs(model.jnt_actfrcrange[j]))))
-    return found
-
-
-def _thrusters(model: Any, notes: list[str]) -> dict[str, RawThruster]:
-    """Return the MJCF actuators on sites that push along a direction, with a moment about it."""
-    import mujoco
-
-    found = {}
-    for k in range(model.nactuator):
-        site, reference = (int(each) for each in model.actuator_trnid[k])
-        if int(model.actuator_trntype[k]) != int(mujoco.mjtTrn.mjTRN_SITE):
-            continue
-        name = model.actuator(k).name or f"thruster_{k + 1}"
-        gear = np.array(model.actuator_gear[k]) * float(model.actuator_gainprm[k][0])
-        force, moment = float(np.linalg.norm(gear[:3])), gear[3:]
-        axis = gear[:3] / (force or 1.0)
-        ratio = float(moment @ axis) / (force or 1.0)
-        why = ""
-        if force == 0.0 or reference >= 0:
-            why = "it gives no force along a direction of its site"
-        elif np.abs(moment - ratio * force * axis).max() > 1e-9 * force:
-            why = "its moment is not about its force"
-        elif int(model.actuator_biastype[k]) != int(mujoco.mjtBias.mjBIAS_NONE):
-            why = "its force depends on more than its control"
-        elif model.actuator_forcelimited[k]:
-            most = (
-                float(model.actuator_forcerange[k][1]) * force / abs(model.actuator_gainprm[k][0])
-            )
-        elif model.actuator_ctrllimited[k]:
-            most = float(model.actuator_ctrlrange[k][1]) * force
-        else:
-            why = "it has neither ctrlrange nor forcerange"
-        if why:
-            notes.append(f"actuator {name} is left out: {why}; write it under thrusters")
-            continue
-        filters = (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT))
-        lag = (
-            float(model.actuator_dynprm[k][0]) if int(model.actuator_dyntype[k]) in filters else 0.0
-        )
-        if model.actuator_ctrllimited[k] and model.actuator_ctrlrange[k][0] < 0.0:
-            notes.append(f"actuator {name} pushes both ways in the file, and only forwards here")
-        turn = np.zeros(9)
-        mujoco.mju_quat2Mat(turn, model.site_quat[site])
-        body = model.body(int(model.site_bodyid[site])).name
-        found[name] = RawThruster(
-            body, np.array(model.site_pos[site]), turn.reshape(3, 3) @ axis, most, ratio, lag
-        )
-    return found
 
 
 def _shapes(model: Any, k: int, meshes: dict[str, TakenMesh], notes: list[str]) -> list[RawShape]:
@@ -429,7 +303,7 @@ def _shapes(model: Any, k: int, meshes: dict[str, TakenMesh], notes: list[str]) 
                 try:
                     shapes = of_points(mesh_triangles(path).reshape(-1, 3) * scale)
                 except (ValueError, OSError) as error:
-                    notes.append(f"link {body}: {_one_line(error)}, so it has no shape")
+                    notes.append(f"link {body}: {one_line(error)}, so it has no shape")
         elif kind == int(kinds.mjGEOM_MESH):
             mesh = int(model.geom_dataid[g])
             start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
@@ -462,14 +336,17 @@ def _look(model: Any, k: int, meshes: dict[str, TakenMesh]) -> RawLook:
     return RawLook(found[False] or found[True])
 
 
-def _key_frame(model: Any) -> dict[str, float]:
-    """Return the joint angles of the key frame called home or stand, else of the first."""
+def _key_frame(spec: Any, model: Any) -> dict[str, float]:
+    """Return the joint positions of the key frame called home or stand, else of the first; empty where no frame gives
+    any, as one that ``nkey`` only leaves room for.
+    """
     import mujoco
 
-    names = [model.key(k).name for k in range(model.nkey)]
-    if not names:
+    given = [k for k, key in enumerate(spec.keys) if len(key.qpos) and not np.isnan(key.qpos[0])]
+    if not given:
         return {}
-    key = next((names.index(name) for name in ("home", "stand", "standing") if name in names), 0)
+    names = {model.key(k).name: k for k in reversed(given)}
+    key = next((names[name] for name in ("home", "stand", "standing") if name in names), given[0])
     simple = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
     return {
         model.joint(j).name: float(model.key_qpos[key][model.jnt_qposadr[j]])

@@ -22,14 +22,16 @@ DECLARED = re.compile(r"\s*<\?xml[^>]*?\sencoding\s*=\s*[\"']([^\"']*)[\"']")
 
 @dataclass(frozen=True)
 class UrdfJoint:
-    """A joint's ``effort`` and ``speed`` (NaN where not given), the joint it mimics, if any, and its
-    ``range``: ``free`` for a joint that has no limits though its type asks for them, ``none`` where they
+    """A joint's ``effort`` and ``speed`` (NaN where not given), the joint it mimics, if any, whose position times
+    ``multiplier`` plus ``offset`` is its own, and its ``range``: ``free`` for a joint that has no limits though its type asks for them, ``none`` where they
     leave it at zero, else empty."""
 
     effort: float
     speed: float
     mimics: str
     range: str = ""
+    multiplier: float = 1.0
+    offset: float = 0.0
 
 
 class XmlFile:
@@ -116,7 +118,11 @@ def urdf_joints(file: XmlFile) -> dict[str, UrdfJoint]:
             for key in ("effort", "velocity")
         )
         mimics = mimic.get("joint", "") if mimic is not None else ""
-        found[joint.get("name", "")] = UrdfJoint(effort, speed, mimics, _range(joint))
+        by = {} if mimic is None else mimic.attrib
+        found[joint.get("name", "")] = UrdfJoint(
+            effort, speed, mimics, _range(joint),
+            _value(by.get("multiplier", "1")), _value(by.get("offset", "0")),
+        )  # fmt: skip
     return found
 
 

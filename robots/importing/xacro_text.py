@@ -10,6 +10,7 @@ import contextlib
 import io
 from pathlib import Path
 
+from ...runtime.language.errors import pip_line
 from ..validation import DescriptionError, RobotError
 from .package_files import find_package
 
@@ -37,7 +38,7 @@ def expand_xacro(path: Path) -> str:
             path,
             "xacro files need the library xacro",
             "a URDF, MJCF or YAML file, or the library",
-            "pip install 'aloft-robotics[xacro]'",
+            pip_line("xacro"),
         ) from None
 
     def find(package: str) -> str:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import mmap
 import os
 import time
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from threading import Lock
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 from ..language.layout import Layout
 from ..language.stages import CheckedGraph
+from ..running.lateness import BUCKETS, TickLateness, lateness_of
 from ..running.memory import BoundGraph, nameless_memory
 from ..running.run_result import RunResult
 from ..running.sink import Sink
@@ -31,9 +33,11 @@ from ..running.timing import STAMPED_TICKS
 
 RATE = 25.0
 """Rate at which the window is renewed [per second of the graph's time]."""
-SEQUENCE, TICK, STATE, OVERRUNS, SKIPPED, CHANGES, SAID = range(7)
-"""The words of the head; ``SAID`` is the length of the text about the end [bytes]."""
-HEAD = 8
+SEQUENCE, TICK, STATE, OVERRUNS, SKIPPED, CHANGES, SAID, LATE_LIMIT, LATEST = range(9)
+"""The words of the head; ``SAID`` is the length of the text about the end [bytes], ``LATE_LIMIT`` the
+limit of ``LatenessCounter`` and ``LATEST`` its longest [ns]. Its buckets follow."""
+COUNTS = 9
+HEAD = COUNTS + BUCKETS
 STARTING, RUNNING, ENDED, PAUSED = range(4)
 """Values of ``STATE``."""
 TEXT = 4096
@@ -156,7 +160,10 @@ class Window(Sink):
             pass
         words[TICK], words[STATE] = self._tick, state
         if pacer is not None:
-            words[OVERRUNS], words[SKIPPED] = pacer.overruns, pacer.skipped_periods
+            lateness = pacer.lateness
+            words[OVERRUNS], words[SKIPPED] = lateness.late, pacer.skipped_periods
+            words[LATE_LIMIT], words[LATEST] = lateness.limit, lateness.longest
+            words[COUNTS:HEAD] = array("q", lateness.counts)
         words[CHANGES] = len(self._bound.parameters.changes)
         place = HEAD
         for count in ticker.overruns_by_block.values():
@@ -208,6 +215,7 @@ class WindowContents:
     Attributes:
         tick: the last tick that is shown.
         state: one of ``STARTING``, ``RUNNING``, ``PAUSED`` and ``ENDED``.
+        lateness: how late ticks began.
         overruns: how many ticks began too late.
         skipped: how many periods were left out.
         changes: how many changes of parameters there were.
@@ -219,6 +227,7 @@ class WindowContents:
 
     tick: int
     state: int
+    lateness: TickLateness
     overruns: int
     skipped: int
     changes: int
@@ -275,6 +284,9 @@ def parse_window(copy: bytes, shape: WindowLayout) -> WindowContents:
     return WindowContents(
         tick=int(words[TICK]),
         state=int(words[STATE]),
+        lateness=lateness_of(
+            words[COUNTS:HEAD].tolist(), *words[[OVERRUNS, LATE_LIMIT, LATEST]].tolist()
+        ),
         overruns=int(words[OVERRUNS]),
         skipped=int(words[SKIPPED]),
         changes=int(words[CHANGES]),

@@ -1,14 +1,20 @@
-"""Decides when a tick may begin: at once, at a deadline of wall time, or with the robot's data."""
+"""Decides when a tick may begin: at once, at a deadline of wall time, or with the robot's data.
+
+A tick is late if it begins more than a share of the period after its deadline, whatever delayed it:
+work of the tick before, or the system, which woke the control thread late.
+"""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from math import ceil
 from typing import Protocol
 
 from ..language.block import Block
 from ..language.errors import AloftError
 from ..language.stages import ClockSpec
+from .lateness import LatenessCounter
 from .memory import BoundGraph
 
 SPIN = 200e-6
@@ -34,19 +40,23 @@ class WallTime:
 
 
 class Pacer(Protocol):
-    """Waits for ticks and counts those that came too late."""
+    """Waits for ticks and counts those that began too late."""
 
-    overruns: int
-    """Ticks whose deadline had passed before they could begin."""
+    lateness: LatenessCounter
+    """How late ticks began; the late ones are the overruns."""
     skipped_periods: int
     """Periods that were left out to catch up."""
     in_a_row: int
-    """The number of overruns since the last tick that was in time."""
+    """The number of late ticks since the last one that was in time."""
     missed_deadline: int
-    """The deadline [ns] of the latest overrun; zero where only the robot knows."""
+    """The deadline [ns] of the last tick, if it passed before the tick's turn came; zero if it did
+    not, and where only the robot knows."""
 
     def wait(self, tick: int) -> int:
-        """Wait until ``tick`` may begin. Returns by how many nanoseconds it is late, or zero."""
+        """Wait until ``tick`` may begin.
+
+        Returns how many nanoseconds after its deadline it begins if that is too late, or zero.
+        """
 
     def restart(self) -> None:
         """Let the next tick begin at once, after a pause: the time of the pause is not lost time."""
@@ -55,13 +65,19 @@ class Pacer(Protocol):
 class Paced:
     """Lets ticks begin at absolute deadlines of wall time: it sleeps first, then polls the clock.
 
-    A tick that cannot begin in time is an overrun: it begins at the next deadline, and all later
-    ticks are delayed with it. So lost time is never made up by faster ticks, and the phase of the
-    deadlines stays.
+    A tick whose turn comes after its deadline begins at the next deadline, and all later ticks are
+    delayed with it. So lost time is never made up by faster ticks, and the phase of the deadlines
+    stays.
+
+    Args:
+        rate: ticks per second.
+        source: the clock.
+        late_after: the share of a period after which a tick is late.
     """
 
-    def __init__(self, rate: float, source: TimeSource) -> None:
-        self.overruns = self.skipped_periods = self.in_a_row = self.missed_deadline = 0
+    def __init__(self, rate: float, source: TimeSource, late_after: float) -> None:
+        self.skipped_periods = self.in_a_row = self.missed_deadline = 0
+        self.lateness = LatenessCounter(round(late_after * 1e9 / rate))
         self._rate = rate
         self._source = source
         self._start: int | None = None
@@ -69,28 +85,30 @@ class Paced:
 
     def wait(self, tick: int) -> int:
         """Sleep and spin to the tick's deadline."""
-        now = self._source.now()
+        read = self._source.now
+        now = read()
         if self._start is None:
             self._start, self._first_tick = now, tick
             self._skipped_before = self.skipped_periods
             return 0
-        deadline = self._deadline(self._start, tick)
-        late = now - deadline
-        if late > 0:
-            self.overruns += 1
-            self.in_a_row += 1
-            self.missed_deadline = deadline
-            self.skipped_periods += ceil(late * 1e-9 * self._rate)
+        due = deadline = self._deadline(self._start, tick)
+        self.missed_deadline = 0
+        if now > due:
+            self.missed_deadline = due
+            self.skipped_periods += ceil((now - due) * 1e-9 * self._rate)
             deadline = self._deadline(self._start, tick)
-        else:
-            self.in_a_row = 0
-            late = 0
-        rest = (deadline - self._source.now()) * 1e-9 - SPIN
+        rest = (deadline - now) * 1e-9 - SPIN
         if rest > 0.0:
             self._source.sleep(rest)
-        while self._source.now() < deadline:
-            pass
-        return late
+            now = read()
+        while now < deadline:
+            now = read()
+        # the clock that ended the wait: it says when the tick begins, and whether that is late
+        if self.lateness.add(now - due):
+            self.in_a_row += 1
+            return now - due
+        self.in_a_row = 0
+        return 0
 
     def restart(self) -> None:
         """Count the deadlines from the next tick on."""
@@ -103,28 +121,49 @@ class Paced:
 
 
 class DrivesClock(Protocol):
-    """The method of a block that can drive the clock, such as a robot or its simulator."""
+    """The method of a block that can drive the clock, such as a robot or its simulator.
+
+    If it has a method ``ready_at``, that returns when the data of the cycle that ``wait`` waited for
+    were there, by ``time.perf_counter_ns``, or zero if it does not know; else only whole cycles count
+    as late.
+    """
 
     def wait(self) -> int:
         """Wait for the next cycle. Returns how many cycles were missed since the last call."""
 
 
 class RobotDriven:
-    """Begins ticks when the robot is ready: by the graph's only block with a ``wait`` method."""
+    """Begins ticks when the robot is ready: by the graph's only block with a ``wait`` method.
 
-    def __init__(self, block: Block, rate: float) -> None:
-        self.overruns = self.skipped_periods = self.in_a_row = self.missed_deadline = 0
+    Args:
+        block: the block.
+        rate: ticks per second.
+        source: the clock.
+        late_after: the share of a period after which a tick is late.
+    """
+
+    def __init__(self, block: Block, rate: float, source: TimeSource, late_after: float) -> None:
+        self.skipped_periods = self.in_a_row = self.missed_deadline = 0
+        self.lateness = LatenessCounter(round(late_after * 1e9 / rate))
         self.block = block
         self._rate = rate
+        self._source = source
+        self._ready_at: Callable[[], int] | None = getattr(block, "ready_at", None)
 
     def wait(self, tick: int) -> int:
         """Wait for the robot; every missed cycle counts as a period late."""
         driver: DrivesClock = self.block  # type: ignore[assignment]  # made so by driving_block
         missed = driver.wait()
-        self.in_a_row = self.in_a_row + 1 if missed else 0
-        self.overruns += bool(missed)
+        lateness = int(missed * 1e9 / self._rate)
+        ready = self._ready_at() if self._ready_at is not None else 0
+        if ready:
+            lateness += max(0, self._source.now() - ready)
         self.skipped_periods += missed
-        return int(missed * 1e9 / self._rate)
+        if self.lateness.add(lateness):
+            self.in_a_row += 1
+            return lateness
+        self.in_a_row = 0
+        return 0
 
     def restart(self) -> None:
         """Do nothing: a run that a robot drives is not paused."""
@@ -144,7 +183,7 @@ def driving_block(bound: BoundGraph) -> Block:
 def make_pacer(spec: ClockSpec, bound: BoundGraph, source: TimeSource) -> Pacer | None:
     """Make the pacer of a graph; none for a free-running one. Raises ``AloftError``."""
     if spec.kind == "paced":
-        return Paced(bound.graph.base_rate, source)
+        return Paced(bound.graph.base_rate, source, spec.late_after)
     if spec.kind == "robot":
-        return RobotDriven(driving_block(bound), bound.graph.base_rate)
+        return RobotDriven(driving_block(bound), bound.graph.base_rate, source, spec.late_after)
     return None

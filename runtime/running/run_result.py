@@ -17,6 +17,7 @@ from ..language.errors import ExitCode, RunError
 from ..language.layout import only_field
 from ..language.parameter_change import ParameterChange
 from ..language.stages import CheckedGraph
+from .lateness import TickLateness
 from .sinks import MemoryLog
 from .timing import BlockTimes
 
@@ -48,7 +49,10 @@ class RunResult:
     metrics: Mapping[str, Metric] = field(default_factory=dict)
     blocks: Mapping[str, BlockTimes] = field(default_factory=dict)
     overruns: int = 0
+    """Ticks that began too late; see ``ClockSpec.late_after``."""
     skipped_periods: int = 0
+    lateness: TickLateness | None = None
+    """How late ticks began; ``None`` for a run that goes as fast as it can."""
     error: RunError | None = None
     stop_problems: tuple[str, ...] = ()
     block_warnings: tuple[str, ...] = ()
@@ -158,6 +162,7 @@ class RunResult:
             "wall_time_s": self.wall_time_s,
             "overruns": self.overruns,
             "skipped_periods": self.skipped_periods,
+            "lateness": None if self.lateness is None else asdict(self.lateness),
             "metrics": {name: _plain(value) for name, value in self.metrics.items()},
             "blocks": {path: asdict(times) for path, times in self.blocks.items()},
             "error": None if self.error is None else self.error.to_json(),
@@ -183,12 +188,13 @@ def merge_metrics(
 ) -> tuple[dict[str, Metric], str | None, str | None]:
     """Merge the metrics of all blocks, and find the verdicts of the blocks that judge the run.
 
-    A block judges the run if it has a metric ``success``.
+    A block judges the run if it has a metric ``success``. A metric ``veto`` is the reason why a run is no
+    success whatever is judged, as that it was damped; where a judge has a reason of its own, that one counts.
 
     Returns:
         The merged metrics, in which those of judging blocks come first; the ``reason`` of the first
-        block whose ``success`` is false, or ``None``; and the ``reason`` of the first block whose
-        ``success`` is true, or ``None``.
+        block whose ``success`` is false, or the first ``veto``, or ``None``; and the ``reason`` of the
+        first block whose ``success`` is true, or ``None``.
     """
     by_block = dict(sorted(by_block.items(), key=lambda item: "success" not in item[1]))
     owners: dict[str, list[str]] = {}
@@ -204,6 +210,8 @@ def merge_metrics(
     merged: dict[str, Metric] = {}
     for path, metrics in by_block.items():
         for name, value in metrics.items():
-            if name not in ("success", "reason"):
+            if name not in ("success", "reason", "veto"):
                 merged[name if len(owners[name]) == 1 else f"{path}.{name}"] = value
+    if failure is None:
+        failure = next((str(m["veto"]) for m in by_block.values() if m.get("veto")), None)
     return merged, failure, success_reason

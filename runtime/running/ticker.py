@@ -248,7 +248,7 @@ class Ticker:
                 take(note)
 
     def _count_overrun(self, tick: int, late: int) -> None:
-        """Count an overrun for the block that ran when the deadline of ``tick`` passed.
+        """Count a late tick, for the block that ran when its deadline passed if one did.
 
         Raises ``RunError`` where the overrun policy is to stop.
         """
@@ -260,7 +260,7 @@ class Ticker:
         if block:
             self.overruns_by_block[block] += 1
         if self.notes:
-            ran = f"; block '{block}' was running" if block else ""
+            ran = f"; block '{block}' was running" if block else "; no block was running"
             data = {"late_ns": late, "block": block, "skipped_periods": pacer.skipped_periods}
             text = f"overrun: {late * 1e-6:.3f} ms late{ran}"
             self.tell(Note(tick, "overrun", text, "WARN", data))

@@ -47,7 +47,7 @@ from time import monotonic
 from typing import Any, Self
 
 from ...processes.child import end_with
-from ...runtime.language.errors import AloftError
+from ...runtime.language.errors import AloftError, pip_line
 
 
 @dataclass(frozen=True)
@@ -457,7 +457,7 @@ def _connected(address: str) -> Iterator[Any]:
         from distributed import Client
     except ImportError as error:
         raise AloftError(
-            "a Dask cluster needs the package distributed: pip install 'aloft-robotics[cluster]'"
+            f"a Dask cluster needs the package distributed: {pip_line('cluster')}"
         ) from error
     loop = running_loop()
     try:

@@ -110,4 +110,6 @@ def test_without_mcap_it_says_what_to_install(
     monkeypatch.setitem(sys.modules, "mcap", None)
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     problem = call_json("log", "export", "count.rrd", "--mcap", code=2)
-    assert problem["reason"] == "MCAP needs the library mcap; pip install 'aloft-robotics[mcap]'"
+    assert (
+        problem["reason"] == "MCAP needs the library mcap; pip install 'mcap>=1.2' 'rosbags>=0.11'"
+    )

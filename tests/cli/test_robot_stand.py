@@ -1,4 +1,4 @@
-"""``aloft stand``: any robot stands or squats in its trial, straight from its file."""
+"""``aloft robot stand``: any robot stands or squats in its trial, straight from its file."""
 
 import subprocess
 from collections.abc import Callable

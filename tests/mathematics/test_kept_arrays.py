@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from aloft.mathematics import kept_arrays as module
-from aloft.mathematics.kept_arrays import code_digest, kept_arrays, kept_folder
+from aloft.mathematics.kept_arrays import code_digest, kept_arrays
 
 
 @pytest.fixture(autouse=True)
@@ -59,6 +60,11 @@ def test_another_key_or_processor_is_computed_by_itself(monkeypatch: pytest.Monk
     assert compute.calls == 3
 
 
+def kept_folder() -> Path:
+    assert module.CACHE.folder is not None
+    return module.CACHE.folder
+
+
 def test_the_processor_is_known_by_what_numpy_may_use() -> None:
     features = np._core._multiarray_umath.__cpu_features__
     named = module.processor().decode()
@@ -99,7 +105,7 @@ def test_nothing_is_kept_of_an_error() -> None:
 
 
 def test_those_used_last_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_FILES", 3)
+    monkeypatch.setattr(module, "CACHE", replace(module.CACHE, most=3))
     compute = Computation()
     for number in range(3):
         kept_arrays(b"%d" % number, compute)

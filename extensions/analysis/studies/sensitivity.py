@@ -24,7 +24,7 @@ from ....files.problems import LoadError, Position, listing, nearest
 from ....files.validation import unit_of
 from ....mathematics.arrays import Array
 from ....plotting import COLOURS, FAINT, image, new_figure, style, svg_text
-from ....runtime.language.errors import AloftError
+from ....runtime.language.errors import AloftError, pip_line
 from ....runtime.language.parameters import given_values
 from ....studies.execution import Run
 from ....studies.expansion import Cell, load_cell
@@ -79,7 +79,7 @@ def import_salib() -> Any:
         import SALib.sample.sobol
     except ImportError as error:
         raise AloftError(
-            "SALib is not installed; install it with: pip install 'aloft-robotics[analysis]'"
+            f"SALib is not installed; install it with: {pip_line('analysis')}"
         ) from error
     return SALib
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from ....files.names import is_file_name
 from ....runtime.language.block import Block
-from ....runtime.language.errors import BlockError, UnitError
+from ....runtime.language.errors import BlockError, UnitError, pip_line
 from ....runtime.language.signals import Field, Signal
 from ....runtime.language.units import BASE_UNITS, Unit, parse_unit
 
@@ -143,9 +143,7 @@ def _read(path: Path, file: str) -> Any:
     try:
         from fmpy.model_description import read_model_description
     except ImportError:
-        raise BlockError(
-            "export.CoSimulation needs FMPy: pip install 'aloft-robotics[fmi]'"
-        ) from None
+        raise BlockError(f"export.CoSimulation needs FMPy: {pip_line('fmi')}") from None
     try:
         read = read_model_description(str(path), validate=False)
     except Exception as error:  # noqa: BLE001  its own errors have no common base

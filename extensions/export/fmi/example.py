@@ -6,7 +6,7 @@ import tempfile
 from functools import lru_cache
 from pathlib import Path
 
-from ....runtime.language.errors import BlockError
+from ....runtime.language.errors import BlockError, pip_line
 
 SLAVE = '''\
 from pythonfmu3 import Fmi3Causality, Fmi3Slave, Fmi3Status, Fmi3Variability, Float64, Unit
@@ -69,9 +69,7 @@ def example_fmu() -> Path:
     try:
         from pythonfmu3.builder import FmuBuilder
     except ImportError:
-        raise BlockError(
-            "the example needs PythonFMU3: pip install 'aloft-robotics[fmi]'"
-        ) from None
+        raise BlockError(f"the example needs PythonFMU3: {pip_line('fmi')}") from None
     folder = tempfile.TemporaryDirectory(prefix="aloft-example-")
     _FOLDERS.append(folder)
     script = Path(folder.name) / "aloft_example_spring.py"

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from ....runtime.language.block import Block, Context, Metric, Output, UnmetRequirement
+from ....runtime.language.errors import pip_line
 from ....runtime.language.parameters import Parameters, parameter
 from ..signals import BodyTwist
 
@@ -54,7 +55,7 @@ class Gamepad(Block):
     back                        the end of the run
     ==========================  =====================================
 
-    The library is pygame (``pip install 'aloft-robotics[gamepad]'``), which knows the pads of all makers through SDL. A
+    The library is pygame (the extra ``gamepad``), which knows the pads of all makers through SDL. A
     thread of its own reads the events, so a tick only copies numbers. A pad may be plugged in later; when it is pulled
     out the velocity is zero. A replay takes the velocities from the recording.
     """
@@ -85,7 +86,7 @@ class Gamepad(Block):
                 "hopping.Gamepad needs pygame, which is not installed",
                 expected="pygame",
                 found="none",
-                fix="pip install 'aloft-robotics[gamepad]'",
+                fix=pip_line("gamepad"),
             )
 
     def setup(self) -> None:

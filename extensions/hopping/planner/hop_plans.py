@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
+from ....files.cache import trusted_file
 from ....mathematics.arrays import Array
 from ....planner.library.jump_table import JumpTable, table_rows
 from ....planner.library.library import SHIPPED, readable_name, user_folder
 from ....planner.library.reference_table import COARSE_STEPS, reference_table
-from ....planner.task.plan import PlannedJump
+from ....planner.task.plan import PlanFileError, PlannedJump
 from ....planner.task.task import content_name, planned_robot
 from ....robots.description import RobotDescription, robot_names
 from ....runtime.language.block import UnmetRequirement
@@ -40,7 +41,16 @@ def samples_file(robot: RobotDescription, *, steps: bool = False) -> Path | None
     if shipped.is_file():
         return shipped
     own = own_path(robot, steps=steps)
-    return own if own.is_file() else None
+    return own if trusted_file(own) and _readable(own) else None
+
+
+def _readable(path: Path) -> bool:
+    """Return whether a file holds plans of hops; one that is damaged is made anew."""
+    try:
+        _read(path)
+    except PlanFileError:
+        return False
+    return True
 
 
 def missing_plans(robot: RobotDescription) -> Iterator[UnmetRequirement]:

@@ -19,7 +19,7 @@ from ....files.document import read_value
 from ....files.nodes import ListNode, MapNode, Node
 from ....files.problems import LoadError, Position, Problem, Problems
 from ....runtime.language.block import Block
-from ....runtime.language.errors import AloftError
+from ....runtime.language.errors import AloftError, pip_line
 from ....runtime.language.importing import NOT_IMPORTED, find_source, without_imports
 from ....runtime.loading.reading.files import PREFIX, graph_path
 
@@ -235,9 +235,7 @@ def make_server() -> LanguageServer:
         from pygls.lsp.server import LanguageServer
         from pygls.uris import from_fs_path, to_fs_path
     except ModuleNotFoundError as error:
-        raise AloftError(
-            "the language server needs pygls: pip install 'aloft-robotics[editor]'"
-        ) from error
+        raise AloftError(f"the language server needs pygls: {pip_line('editor')}") from error
     from .... import __version__
 
     server = LanguageServer("aloft", __version__, types.TextDocumentSyncKind.Full)

@@ -31,7 +31,7 @@ from ....runtime.live.window import (
 )
 from ....runtime.loading import LoadError, checked_file, checked_text
 from ....runtime.running.memory import Memory
-from .texts import ValueTexts, tick_text, time_texts
+from .texts import ValueTexts, lateness_text, tick_text, time_texts
 
 STALLED_AFTER = 1.0
 """Seconds without a new tick after which the graph is shown as standing still."""
@@ -134,7 +134,7 @@ class LiveRun:
         if self.clock == "free":
             lines.append("as fast as it can, so there are no deadlines")
         else:
-            lines.append(f"{look.overruns} ticks began late, {look.skipped} periods left out")
+            lines.append(lateness_text(look))
         return {
             "tick": look.tick,
             "line": "; ".join(line for line in lines if line),

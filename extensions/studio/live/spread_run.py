@@ -19,7 +19,7 @@ from ....runtime.live.window import RATE, STARTING, digest
 from ....runtime.placement.placed import PlacedGraph
 from ....runtime.running.memory import Memory
 from .live_run import STALLED_AFTER
-from .texts import ValueTexts, tick_text, time_texts
+from .texts import ValueTexts, lateness_text, tick_text, time_texts
 
 Find = Callable[[], PlacedGraph | None]
 """Gives the graph as it runs now, with its endpoints; ``None`` where that is not known."""
@@ -210,7 +210,7 @@ class _Part:
         lines = [f"tick {look.tick}, {look.tick * self._period:.3f} s"]
         lines.append(tick_text(look.stamps, self._period))
         if look.overruns or look.skipped:
-            lines.append(f"{look.overruns} ticks began late, {look.skipped} periods left out")
+            lines.append(lateness_text(look))
         times = time_texts(about.shape.programs, look.stamps, look.late)
         return {
             "tick": look.tick,

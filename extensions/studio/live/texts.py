@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ....logs.viewing.signal_names import value_text
 from ....runtime.language.layout import Layout
 from ....runtime.language.stages import CheckedGraph
+from ....runtime.live.window import WindowContents
 
 FEW = 2
 """Numbers of a port that stand beside its wire."""
@@ -122,6 +123,15 @@ def time_texts(
         )
         found[path] = (duration(median), text)
     return found
+
+
+def lateness_text(look: WindowContents) -> str:
+    """Say how late the ticks of a paced run began."""
+    late = look.lateness
+    if not late.ticks:
+        return ""
+    text = f"{look.overruns} ticks began late, {look.skipped} periods left out"
+    return f"{text}; 99 % began within {late.p99_us:.3g} us, the latest after {late.max_us:.4g} us"
 
 
 def tick_text(stamps: Sequence[NDArray[np.int64]], period: float) -> str:

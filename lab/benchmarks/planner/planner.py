@@ -147,7 +147,7 @@ SNOPT = "SNOPT through Drake"
 SNOPT_GOAL = 1.0 / 30.0
 TIME_LIMIT = 120.0
 """CPU time that SNOPT is given for a task [s]."""
-INSTALL = "Drake is not installed: pip install aloft-robotics[peers]"
+INSTALL = "Drake is not installed; the extra peers has it"
 
 
 def solver_rows(tasks: dict[str, dict[str, Any]], rounds: int = 3) -> list[Row]:

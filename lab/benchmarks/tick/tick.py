@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from ....blocks.control.dynamics import Dynamics
 from ....blocks.control.whole_body_controller import WholeBodyController
-from ....runtime.language.errors import AloftError
+from ....runtime.language.errors import AloftError, pip_line
 from ..full_program import FullMatrices
 from ..rows import Row
 from ..startup import time_process
@@ -376,11 +376,7 @@ def _missing(package: str) -> str:
     """Return the reason why a peer cannot be measured; empty where it is installed."""
     from importlib.util import find_spec
 
-    return (
-        ""
-        if find_spec(package)
-        else f"not installed: pip install aloft-robotics[peers] has {package}"
-    )
+    return "" if find_spec(package) else f"not installed: {pip_line('peers')} has {package}"
 
 
 @contextmanager

@@ -164,9 +164,15 @@ class ClockKeys(_Keys):
     """Keys of the pacing of a run."""
 
     kind: ClockKind = _key("as fast as possible, by wall time, or by the robot")
-    overrun: Overrun = _key("what follows where a tick takes too long")
+    overrun: Overrun = _key("what follows where a tick begins too late")
     stop_after: Annotated[int, Field(ge=1, strict=True)] = _key(
-        "the overruns in a row that end the run"
+        "the late ticks in a row that end the run"
+    )
+    late_after: Annotated[float, Field(gt=0.0, le=100.0)] = _key(
+        "the share of a period after its deadline at which a tick is late: 0.1"
+    )
+    late_share: Annotated[float, Field(ge=0.0, le=1.0)] = _key(
+        "the largest share of late ticks with which a run is a success; by default any"
     )
     hangs_after: Seconds = _key("the time after which a call of a block is taken to hang")
 

@@ -1,5 +1,6 @@
 """``blocks.Integrator``: exact values."""
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -7,6 +8,7 @@ from pydantic import ValidationError
 
 from aloft.blocks.general.integrators_and_delays import (
     Delay,
+    DoubleIntegrator,
     Integrator,
     SampleHold,
     TrapezoidalIntegrator,
@@ -109,3 +111,31 @@ def test_every_third_input_is_held() -> None:
         bench.step()
         found.append(bench.get("y").value[0])
     assert found == [0, 0, 0, 3, 3, 3, 6, 6]
+
+
+def amplitude(frequency: float, runs: int) -> float:
+    """The greatest position of a mass on a spring in the last hundred runs; it starts from 1."""
+    bench = BlockBench(DoubleIntegrator, {"initial": 1.0}, rate=500.0)
+    found = []
+    for _ in range(runs):
+        bench.set("u", value=-(frequency**2) * bench.get("x").value)
+        bench.step()
+        found.append(abs(float(bench.get("y").value[0])))
+    return max(found[-100:])
+
+
+@pytest.mark.parametrize("frequency", [12.25, 200.0, 900.0])
+def test_a_spring_on_a_double_integrator_keeps_its_amplitude(frequency: float) -> None:
+    # The exact bound of symplectic Euler: 1 / sqrt(1 - (w T / 2)^2).
+    assert amplitude(frequency, 5000) <= 1.0 / np.sqrt(1.0 - (frequency / 1000.0) ** 2) + 1e-9
+
+
+def test_a_double_integrator_falls_as_the_sum_of_its_steps() -> None:
+    bench = BlockBench(DoubleIntegrator, {"initial": 3.0, "initial_rate": 1.0}, rate=4.0)
+    found = []
+    for reset in (False, False, True, False):
+        bench.set("u", value=2.0)
+        bench.set("reset", value=reset)
+        bench.step()
+        found.append((float(bench.get("rate").value[0]), float(bench.get("y").value[0])))
+    assert found == [(1.0, 3.0), (1.5, 3.375), (2.0, 3.875), (1.0, 3.0)]

@@ -44,6 +44,8 @@ CASES = [
     ("Product", "", "a: s.m, b: s.s", "y", "m s"),
     ("Product", "operation: divide", "a: s.m, b: s.s", "y", "m/s"),
     ("Integrator", "", "u: s.m", "y", "m s"),
+    ("DoubleIntegrator", "", "u: s.m", "y", "m s^2"),
+    ("DoubleIntegrator", "", "u: s.m", "rate", "m s"),
     ("TrapezoidalIntegrator", "", "u: s.m", "y", "m s"),
     ("FilteredDerivative", "time_constant: 0.1", "u: s.m", "y", "m/s"),
     ("LowPass", "cutoff: 5", "u: s.m", "y", "m"),

@@ -16,7 +16,7 @@ from aloft.planner.checking.validity import InvalidPlanError
 from aloft.planner.library import validation_cache
 from aloft.planner.library.library import PlanLibrary, shipped_folder
 from aloft.planner.library.reference_table import reference_table
-from aloft.planner.library.validation_cache import check_unless_noted, notes_folder
+from aloft.planner.library.validation_cache import NOTES, check_unless_noted
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 
@@ -117,7 +117,7 @@ def test_what_has_passed_is_not_checked_again_and_other_content_is() -> None:
     for content in (b"one", b"one", b"other", b"one"):
         check_unless_noted(content, check)
     assert check.calls == 2
-    assert len(list(notes_folder().iterdir())) == 2
+    assert NOTES.folder is not None and len(list(NOTES.folder.iterdir())) == 2
 
 
 def test_what_has_failed_is_checked_every_time() -> None:

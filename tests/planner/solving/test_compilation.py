@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 import pytest
 
+from aloft.files.cache import make_folders
 from aloft.planner.models.symbolic_model import SymbolicModel
 from aloft.planner.problem.stage_functions import StageFunction, derived
 from aloft.planner.solving import compilation
@@ -39,8 +40,8 @@ def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     compiled: list[str] = []
     real = compilation._compile
 
-    def compile_piece(compiler: str, piece: StageFunction, library: Path) -> bool:
-        compiled.append(library.stem)
+    def compile_piece(compiler: str, piece: StageFunction, library: str) -> bool:
+        compiled.append(library.rpartition("/")[2])
         return real(compiler, piece, library)
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
@@ -65,7 +66,8 @@ def test_without_a_compiler(made: list[str], monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(compilation, "find_compiler", lambda: None)
     assert values(load()) == [[4.5, 6.0]] * 2
     assert made == []
-    assert not list(compilation.cache_folder().rglob("*"))
+    folder = compilation.LIBRARIES.folder
+    assert folder is not None and not list(folder.rglob("*"))
 
 
 @needs_compiler
@@ -74,17 +76,17 @@ def test_what_another_process_compiles_is_waited_for_last(
 ) -> None:
     robot = find_robot("bruce")
     key = compilation.content_hash(robot, "test", (), ())
-    library = compilation.cache_folder() / key / "slow.so"
-    library.parent.mkdir(parents=True)
+    library = compilation.LIBRARIES.path(f"{key}/slow")
+    assert library is not None and make_folders(library.parent)
     # A second description of the open file: this process holds the lock as another one would.
     other = library.with_suffix(".lock").open("w")
     fcntl.flock(other, fcntl.LOCK_EX)
     counted = compilation._compile
 
-    def and_meanwhile(compiler: str, piece: StageFunction, made_here: Path) -> bool:
+    def and_meanwhile(compiler: str, piece: StageFunction, made_here: str) -> bool:
         done = counted(compiler, piece, made_here)
-        if made_here.stem == "quick":  # now the other process has made the slow one
-            assert counted(compiler, make("slow"), library)
+        if made_here.endswith("/quick"):  # now the other process has made the slow one
+            assert counted(compiler, make("slow"), f"{key}/slow")
             other.close()
         return done
 
@@ -121,3 +123,27 @@ def test_what_is_long_is_not_optimised_and_the_same(
     monkeypatch.setattr(compilation, "LONG", long)
     assert values(load()) == [[4.5, 6.0]] * 2
     assert found == flags
+
+
+@needs_compiler
+@pytest.mark.parametrize("damage", ["empty", "bit", "cut", "exchanged"])
+def test_a_damaged_library_is_compiled_anew(
+    damage: str, made: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    load()
+    folder = compilation.LIBRARIES.folder
+    assert folder is not None
+    quick, slow = (next(folder.rglob(f"{name}.so")) for name in ("quick", "slow"))
+    content = {
+        "empty": b"",
+        "bit": quick.read_bytes().replace(b"\x7fELF\x02", b"\x7fELF\x03", 1),
+        "cut": quick.read_bytes()[:-4096],
+        "exchanged": slow.read_bytes(),
+    }[damage]
+    # a loaded library is not written into: it is taken away and another one laid there
+    quick.unlink()
+    quick.write_bytes(content)
+    monkeypatch.setattr(compilation, "_held", {})
+    made.clear()
+    assert values(load()) == [[4.5, 6.0]] * 2
+    assert made == ["quick"]

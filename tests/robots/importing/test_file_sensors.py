@@ -58,7 +58,7 @@ def imported(folder: Path, name: str, text: str) -> tuple[str, Path]:
     path = folder / name
     path.write_text(text)
     target = folder / "robot.yaml"
-    written, _ = new_yaml(path, target)
+    written = new_yaml(path, target).text
     target.write_text(written)
     return written, target
 

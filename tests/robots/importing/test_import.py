@@ -90,7 +90,7 @@ def test_a_planar_base(tmp_path: Path) -> None:
 def test_several_joints_at_one_body_become_links_with_little_mass(tmp_path: Path) -> None:
     robot = robot_of(tmp_path, SPHERICAL_HIP)
     assert [(j.parent, j.child) for j in robot.joints] == [("torso", "leg_1"), ("leg_1", "leg")]
-    assert [link.mass for link in robot.links] == pytest.approx([5.0, 0.001, 0.999])
+    assert [link.mass for link in robot.links] == pytest.approx([5.0, 1e-6, 1.0 - 1e-6], rel=1e-9)
 
 
 def test_an_arm_bolted_to_the_world(tmp_path: Path) -> None:
@@ -195,7 +195,7 @@ def test_joints_without_a_range_are_free_or_fixed(tmp_path: Path) -> None:
     assert notes == ["joint elbow has no lower and upper limit in the URDF and turns freely here"]
     robot, notes = notes_of(tmp_path, ARM.replace('lower="-2" upper="2" ', 'lower="0" upper="0" '))
     assert [joint.name for joint in robot.joints] == ["shoulder"]
-    assert notes == ["joint elbow has a range of 0 to 0 in the URDF and is fixed here"]
+    assert notes == ["joint elbow has a range of 0 to 0 in the URDF and is fixed at 0 here"]
 
 
 def test_rotors_are_estimated_from_torque_and_speed(tmp_path: Path) -> None:

@@ -87,7 +87,7 @@ def test_a_joint_that_an_equality_ties_is_fixed(tmp_path: Path) -> None:
     text = ONE_LEG.replace("<actuator>", tie)
     found = read_text(tmp_path, text)
     assert [joint.name for joint in found.description.joints] == ["hip"]
-    assert "joint knee follows hip in the file and is fixed here" in found.notes
+    assert "joint knee follows hip in the file and is fixed at 0.749066 here" in found.notes
     inactive = read_text(tmp_path, text.replace("<joint joint1", '<joint active="false" joint1'))
     assert len(inactive.description.joints) == 2
     assert math.isfinite(found.description.total_mass)

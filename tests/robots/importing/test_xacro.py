@@ -82,5 +82,5 @@ def test_without_the_library_the_error_says_how_to_get_it(
     assert report(write(tmp_path)).splitlines()[:3] == [
         "arm.urdf.xacro: xacro files need the library xacro",
         "    expected   a URDF, MJCF or YAML file, or the library",
-        "    fix        pip install 'aloft-robotics[xacro]'",
+        "    fix        pip install 'xacro>=2.1'",
     ]

@@ -10,6 +10,7 @@ from aloft.runtime.language.errors import AloftError, ExitCode
 from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.running.executor import Executor, run
+from aloft.runtime.running.lateness import LatenessCounter
 from aloft.runtime.running.pacing import Paced
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
@@ -79,7 +80,7 @@ def begun_ms() -> list[float]:
 
 def test_the_time_of_a_pause_is_no_lost_time() -> None:
     time = PollingTime()
-    pacer = Paced(100.0, time)
+    pacer = Paced(100.0, time, 0.1)
     assert pacer.wait(0) == 0
     time.instant += 25 * MS  # a tick that takes too long
     assert pacer.wait(1) > 0 and pacer.skipped_periods == 2
@@ -87,7 +88,7 @@ def test_the_time_of_a_pause_is_no_lost_time() -> None:
     pacer.restart()
     began = time.instant
     assert pacer.wait(2) == 0 and time.instant - began < MS, "it begins at once"
-    assert pacer.wait(3) == 0 and (pacer.overruns, pacer.skipped_periods) == (1, 2)
+    assert pacer.wait(3) == 0 and (pacer.lateness.late, pacer.skipped_periods) == (1, 2)
     assert (time.instant - began) / MS == pytest.approx(10.0, abs=0.1), "and then in periods"
 
 
@@ -109,9 +110,9 @@ def test_an_overrun_skips_to_the_next_whole_period_and_blames_the_block() -> Non
 
 def test_the_stop_policy_ends_the_run() -> None:
     result = paced(ClockSpec("paced", "stop", 1), [2], 3.25).run()
-    assert result.reason.startswith("overrun at tick 3 (0.006 s): 1.25")
+    assert result.reason.startswith("overrun at tick 3 (0.006 s): 2.000 ms late, 1")
     assert result.reason.endswith(
-        " ms late, 1 in a row; block 'b' was running when the deadline passed, and the overrun "
+        " in a row; block 'b' was running when the deadline passed, and the overrun "
         "policy is 'stop'"
     )
     assert (result.ticks, result.exit_code) == (3, ExitCode.RUN_FAILED)
@@ -127,20 +128,85 @@ def test_the_stop_policy_can_bear_some_in_a_row() -> None:
 
 def test_deadlines_do_not_drift_when_the_period_is_no_whole_number_of_nanoseconds() -> None:
     time = VirtualTime()
-    pacer = Paced(300.0, time)
+    pacer = Paced(300.0, time, 0.1)
     for tick in range(30_001):
         pacer.wait(tick)
         time.instant += 1_000
         # a virtual spin cannot end by itself: go to the deadline
         time.instant = max(time.instant, int((tick + 1) * 1e9 / 300.0))
     assert time.instant == int(30_001 * 1e9 / 300.0)
-    assert pacer.overruns == 0
+    assert pacer.lateness.late == 0
 
 
 def test_without_pacing_nothing_is_waited_for() -> None:
     result = paced(ClockSpec("free"), [1, 2], 50.0).run()
     assert TIME.slept == []
     assert (result.overruns, result.blocks["b"].overruns) == (0, 0)
+
+
+class LateSystem(PollingTime):
+    """A system that wakes whoever sleeps a share of a period of 2 ms too late."""
+
+    share = 0.98
+
+    def sleep(self, seconds: float) -> None:
+        super().sleep(seconds + 200e-6 + self.share * 2e-3)
+
+
+def with_late_system(clock: ClockSpec, share: float) -> Executor:
+    graph = checked_graph({"a": BlockUse(Worker)}, rate=500.0, ticks=50, clock=clock)
+    time = LateSystem()
+    time.share = share
+    return Executor(graph, time_source=time)
+
+
+def test_a_late_wake_up_makes_the_tick_late() -> None:
+    result = with_late_system(ClockSpec("paced"), 0.98).run()
+    assert (result.overruns, result.skipped_periods) == (25, 0), "the next one only polls"
+    late = result.lateness
+    assert late is not None and (late.ticks, late.late, late.late_after_us) == (49, 25, 200.0)
+    assert 1960.0 <= late.max_us < 1961.0
+    assert late.max_us == late.p50_us == late.p99_9_us, "none is above the longest"
+    assert sum(count for _, count in late.histogram) == 49
+
+
+def test_the_limit_of_lateness_is_a_share_of_the_period() -> None:
+    assert with_late_system(ClockSpec("paced", late_after=0.99), 0.98).run().overruns == 0
+    assert with_late_system(ClockSpec("paced"), 0.09).run().overruns == 0
+    assert with_late_system(ClockSpec("paced"), 0.11).run().overruns == 49
+
+
+def test_a_graph_may_say_how_many_ticks_may_be_late() -> None:
+    result = with_late_system(ClockSpec("paced", late_share=0.4), 0.98).run()
+    assert not result.success
+    assert result.reason == "25 of 50 ticks began late, at most 40 % may (clock.late_share)"
+    assert with_late_system(ClockSpec("paced", late_share=0.5), 0.98).run().success
+
+
+def test_late_wake_ups_end_the_run_where_the_policy_is_to_stop() -> None:
+    result = with_late_system(ClockSpec("paced", "stop", 3), 0.5).run()
+    assert result.reason == (
+        "overrun at tick 3 (0.006 s): 1.000 ms late, 3 in a row; no block was running when the "
+        "deadline passed, and the overrun policy is 'stop'"
+    )
+
+
+def test_a_skipped_period_counts_from_the_deadline_that_passed() -> None:
+    late = paced(ClockSpec("paced"), [2], 4.5).run().lateness
+    assert late is not None and late.late == 1
+    assert late.max_us == pytest.approx(4000.0, abs=0.1), "two periods of 2 ms"
+    assert late.p50_us < 1.1
+
+
+def test_the_buckets_hold_every_lateness() -> None:
+    for lateness in [0, 1, 1023, 1024, 1151, 1152, 123_456, 10**9, (1 << 30) - 1, 1 << 30, 10**15]:
+        counter = LatenessCounter(10**16)
+        counter.add(lateness)
+        ((edge, count),) = counter.result().histogram
+        assert count == 1 and lateness < edge * 1e3
+        if 1024 <= lateness < 1 << 30:
+            assert edge * 1e3 <= 1.125 * lateness + 1.0, "an eighth too high at most"
+        assert counter.result().max_us == lateness * 1e-3
 
 
 class Driver(Block):
@@ -168,6 +234,36 @@ def test_a_robot_drives_the_clock() -> None:
     result = run(graph, ticks=5)
     assert result.signal("robot.y.value")[:, 0].tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]
     assert (result.overruns, result.skipped_periods) == (1, 2)
+
+
+class StampedDriver(Block):
+    """A robot that says when its data were there, here 0.3 ms before the control thread woke."""
+
+    class Params(Parameters):
+        n: int = 1
+
+    y = Output(Vector, text="nothing")
+
+    def wait(self) -> int:
+        TIME.instant += 2 * MS
+        return 0
+
+    def ready_at(self) -> int:
+        return TIME.instant - 300_000
+
+    def step(self) -> None:
+        """Compute nothing."""
+
+
+def test_a_robot_says_when_its_data_were_there() -> None:
+    global TIME
+    TIME = PollingTime()
+    for share, late in ((0.1, 5), (0.2, 0)):
+        clock = ClockSpec("robot", late_after=share)
+        graph = checked_graph({"robot": BlockUse(StampedDriver)}, rate=500.0, clock=clock)
+        result = Executor(graph, time_source=TIME).run(5)
+        assert (result.overruns, result.skipped_periods) == (late, 0)
+        assert result.lateness is not None and result.lateness.max_us == pytest.approx(300, abs=0.1)
 
 
 def test_a_failing_wait_names_the_robot() -> None:

@@ -15,7 +15,7 @@ from hashlib import sha256
 from math import prod
 from pathlib import Path
 
-from .....runtime.language.errors import AloftError
+from .....runtime.language.errors import AloftError, pip_line
 from ...clib.cut import start_of
 from ...clib.module import STATUS_TEXTS
 from ...clib.targets import TARGETS, assembler
@@ -43,9 +43,7 @@ def write_native(made: Prepared, to: Path, version: str, title: str) -> None:
     try:
         import fmpy
     except ImportError:
-        raise AloftError(
-            "the headers of FMI come with FMPy: pip install 'aloft-robotics[fmi]'"
-        ) from None
+        raise AloftError(f"the headers of FMI come with FMPy: {pip_line('fmi')}") from None
     name, scalars = made.name, list(_variables(made, version))
     text = made.module.text()
     token = sha256(f"{version} {made.about['graph_hash']} {text}".encode()).hexdigest()[:32]

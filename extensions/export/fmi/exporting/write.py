@@ -15,7 +15,7 @@ from typing import Any
 from ..... import __version__
 from .....logs.file.dependencies import named_file
 from .....runtime.bundle import copy_module, with_robot_beside
-from .....runtime.language.errors import AloftError
+from .....runtime.language.errors import AloftError, pip_line
 from ...clib.cut import Cut, Terminal, cut, start_of
 from ...clib.part import NeedsPython
 from ...clib.write import prepare
@@ -100,9 +100,7 @@ def _with_python(to: Path, cut_out: Cut, title: str, reasons: tuple[str, ...]) -
     try:
         from pythonfmu3.builder import FmuBuilder
     except ImportError:
-        raise AloftError(
-            "an FMU is made with PythonFMU3: pip install 'aloft-robotics[fmi]'"
-        ) from None
+        raise AloftError(f"an FMU is made with PythonFMU3: {pip_line('fmi')}") from None
     with tempfile.TemporaryDirectory(prefix="aloft-export-") as made:
         folder = Path(made) / "graph"
         folder.mkdir()

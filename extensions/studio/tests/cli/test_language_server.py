@@ -107,7 +107,7 @@ def test_other_yaml_is_left_alone() -> None:
 
 def test_a_missing_extra_is_one_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "lsprotocol", None)
-    with pytest.raises(AloftError, match=r"needs pygls: pip install 'aloft-robotics\[editor\]'"):
+    with pytest.raises(AloftError, match=r"needs pygls: pip install 'pygls"):
         make_server()
 
 
