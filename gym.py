@@ -5,7 +5,7 @@
     env = aloft.gym.make(
         "cart_pole.yaml",
         action="force",                       # a block blocks.External
-        observation=["robot.joints.position", "robot.joints.velocity"],
+        observation=["robot.joints.position", "robot.joints.velocity"],  # fields, or whole signals
         reward="score.y",                     # a signal of one number, or a function of the run
         action_limits=(-10.0, 10.0),
         ticks=5,
@@ -13,8 +13,10 @@
 
 An episode begins at the graph's start. ``reset(seed=k)`` gives every parameter called ``seed`` the
 value k; without it episodes have seeds that are drawn from the environment's own generator. A block
-that asks for the end of the run terminates the episode, and the graph's duration truncates it. An
-action outside its limits, and a step of an episode that is over, are errors.
+that asks for the end of the run terminates the episode, also in the last tick, and the graph's duration
+truncates it. An action that is outside its limits by a rounding to 32 bits is taken for the limit; one
+farther outside, and a step of an episode that is over, are errors. Observation and reward are those of the
+last tick of a step.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ import numpy as np
 from .mathematics.arrays import Array
 from .runtime.graph import Graph, load
 from .runtime.language.errors import AloftError, pip_line
+from .runtime.language.signals import Signal
 from .runtime.running.stepping import SteppedRun
 
 try:
@@ -37,6 +40,9 @@ except ModuleNotFoundError as error:
 
 Reward = str | Callable[[SteppedRun], float]
 _MOST_SEEDS = 2**31
+ROUNDING = 1e-6
+"""Share of the largest of the limits' sizes and their distance by which an action may be outside of them: 32 bits
+keep 6e-8, and wrappers that scale actions lose some of it."""
 
 
 class GraphEnvironment(gymnasium.Env[Array, Array]):
@@ -105,11 +111,12 @@ class GraphEnvironment(gymnasium.Env[Array, Array]):
         run[self._action] = self._checked(action)
         run.step(self._ticks)
         over = run.graph.ticks is not None and run.tick >= run.graph.ticks
-        terminated = bool(run.reason) and not over
+        terminated = run.stopped  # a fall in the last tick is no success
         info = {"time": run.time, **({"reason": run.reason} if run.reason else {})}
         if terminated or over:
             self._over = run.reason or "the duration is over"
-        return self._observation(), self._reward_now(), terminated, over, info
+        truncated = over and not terminated
+        return self._observation(), self._reward_now(), terminated, truncated, info
 
     def close(self) -> None:
         """Close the graph's blocks."""
@@ -128,13 +135,17 @@ class GraphEnvironment(gymnasium.Env[Array, Array]):
         assert isinstance(space, gymnasium.spaces.Box)
         if given.shape != space.shape:
             raise AloftError(f"an action has the shape {space.shape}, not {given.shape}")
-        outside = ~((given >= space.low) & (given <= space.high))
+        low, high = space.low, space.high
+        size = np.max([np.abs(low), np.abs(high), high - low], axis=0)
+        rounding = np.where(np.isfinite(size), ROUNDING * size, 0.0)
+        outside = ~((given >= low - rounding) & (given <= high + rounding))
         if outside.any():
             k = int(np.flatnonzero(outside)[0])
             raise AloftError(
                 f"element {k} of the action is {given.flat[k]:g}, outside of its limits "
                 f"{space.low.flat[k]:g} to {space.high.flat[k]:g}; clip it, or set action_limits"
             )
+        given = np.clip(given, low, high)
         return self._middle + self._half * given if self._normalised else given
 
     def _running(self) -> SteppedRun:
@@ -144,17 +155,24 @@ class GraphEnvironment(gymnasium.Env[Array, Array]):
 
     def _observation(self) -> Array:
         run = self._running()
-        parts = [np.asarray(run[name], np.float64).ravel() for name in self._observed]
+        parts = [each for name in self._observed for each in _numbers(run, name)]
         return np.concatenate(parts)
 
     def _reward_now(self) -> float:
         run = self._running()
         if not isinstance(self._reward, str):
             return float(self._reward(run))
-        value = np.asarray(run[self._reward])
+        value = np.concatenate(_numbers(run, self._reward))
         if value.size != 1:
             raise AloftError(f"the reward {self._reward} has {value.size} numbers, expected one")
-        return float(value.reshape(()))
+        return float(value[0])
+
+
+def _numbers(run: SteppedRun, name: str) -> list[Array]:
+    """Return the numbers of a field, or of all fields of a signal, each as a vector."""
+    found = run[name]
+    fields = found.views().values() if isinstance(found, Signal) else (found,)
+    return [np.asarray(field, np.float64).ravel() for field in fields]
 
 
 def make(
@@ -172,8 +190,9 @@ def make(
     Args:
         graph: a graph, or whatever ``aloft.load`` takes.
         action: the path of a block ``blocks.External``.
-        observation: signals, ``block.port.field``; their numbers follow each other.
-        reward: a signal with one number, or a function of the run.
+        observation: fields, ``block.port.field``, or signals with all their fields, ``block.port``; their
+            numbers follow each other.
+        reward: a field or a signal with one number, or a function of the run.
         action_limits: the least and the greatest action, each a number or one for every element.
         normalised: actions are -1 to 1, and stand for the least to the greatest.
         ticks: how many ticks of the graph a step is.

@@ -11,6 +11,7 @@ from .needed import needs
 
 needs("gymnasium")
 
+import gymnasium
 from gymnasium.utils.env_checker import check_env
 
 from aloft import gym
@@ -138,3 +139,55 @@ def test_mistakes(options: dict[str, object], error: type[Exception], message: s
     }  # fmt: skip
     with pytest.raises(error, match=message):
         gym.make(GRAPH, **{**base, **options})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("ticks", [1, 5])
+def test_a_fall_in_the_last_tick_is_a_fall(ticks: int) -> None:
+    """The bound is broken in tick 99 of 100, or one tick sooner."""
+    text = GRAPH.replace(
+        "blocks.WhiteNoise, with: {std: 0.1", "blocks.Constant, with: {value: [0.0]"
+    )
+    env = gym.make(
+        text.replace("upper: 0.3", "upper: 0.975"), action="action", observation="place.y",
+        reward="reward.y", ticks=ticks,
+    )  # fmt: skip
+    env.reset()
+    while True:
+        *_, terminated, truncated, info = env.step(np.ones(1))
+        if terminated or truncated:
+            break
+    assert (terminated, truncated) == (True, False) and "bounds" in info["reason"]
+    assert info["time"] == pytest.approx(1.0)
+
+
+@pytest.mark.filterwarnings("ignore:overflow encountered in cast")  # gymnasium's own
+def test_rounding_at_a_limit_is_no_mistake() -> None:
+    rng = np.random.default_rng(0)
+    pairs = [(-0.1, 0.3), (-1.1, 2.2), (0.0, 0.3), *rng.uniform(-5.0, 5.0, (20, 2)).round(2)]
+    for pair in pairs:
+        low, high = sorted(float(each) for each in pair)
+        env = gym.make(
+            GRAPH, action="action", observation="place.y", reward="reward.y",
+            action_limits=(low, high),
+        )  # fmt: skip
+        scaled = gymnasium.wrappers.RescaleAction(env, np.float32(-1), np.float32(1))
+        scaled.reset(seed=0)
+        for end, limit in ((-1.0, low), (1.0, high)):
+            scaled.step(np.array([end]))
+            assert low <= env._running()["action.y.value"][0] <= high
+            env.step(np.array([limit], np.float32))
+            assert env._running()["action.y.value"][0] == pytest.approx(limit, abs=1e-6)
+        with pytest.raises(AloftError, match="outside of its limits"):
+            env.step(np.array([high + 1e-4 * (high - low)]))
+        env.close()
+
+
+def test_a_port_is_all_its_fields() -> None:
+    env = gym.make(GRAPH, action="action", observation=["place.y", "bounds.ok"], reward="reward.y")
+    observation, _ = env.reset(seed=1)
+    assert observation.shape == (2,) and observation[1] == 1.0
+    assert env.step(np.ones(1))[1] == env._running()["reward.y.value"][0]
+    wide = GRAPH.replace("{std: 0.1,", "{std: 0.1, n: 2,").replace("a: action.y,", "a: noise.y,")
+    wide = wide.replace("blocks.Sum", "blocks.Sum, with: {n: 2}").split("  place:")[0]
+    with pytest.raises(AloftError, match=r"the reward speed\.y has 2 numbers, expected one"):
+        gym.make(wide, action="action", observation="speed.y", reward="speed.y")

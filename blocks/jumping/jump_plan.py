@@ -56,7 +56,7 @@ class JumpPlan(Block):
     warnings of the run name every test that failed, and the metrics have ``plan_valid`` and
     ``plan_tests_failed``. For those formulations the reference has the centre of mass and momentum
     of the plan's own simplified model. ``formulation`` plans the same task in another formulation,
-    without the features that only ``full`` has: impacts, margins and limits of the motors.
+    without the keys for which that has nothing, such as impacts; the warnings of the run name them.
 
     The plan begins with the run; that of a ``TriggeredJumpPlan`` when the robot has been put down.
     At the start the robot stands still for ``stand_time``; at the end it stays where the plan
@@ -283,6 +283,7 @@ class JumpPlan(Block):
         from ...planner.library.validation_cache import cached_reference_table
 
         robot, task = self.robot, planned_task(self.params, self.context)
+        self._left_out = self._keys_left_out()
         plan = self._plan(task, robot)
         self._report = self._report_validity(plan)
         table = cached_reference_table(plan, robot, self.params.stand_time)
@@ -330,12 +331,29 @@ class JumpPlan(Block):
 
     def warnings(self) -> Sequence[str]:
         report = self._report
+        found = []
+        if self._left_out:
+            found.append(
+                f"formulation {self.params.formulation} has nothing for {', '.join(self._left_out)} of the task, "
+                "which are left out"
+            )
         if report is None or report.valid:
-            return ()
+            return found
         return (
+            *found,
             "THE PLAN IS NOT VALID and is followed all the same (check: reported):\n"
             + report.explain(),
         )
+
+    def _keys_left_out(self) -> list[str]:
+        """Return the keys of the task for which the formulation that is chosen in its place has nothing."""
+        if self.params.formulation is None:
+            return []
+        from ...planner.task.boundary_set import in_formulation
+
+        return in_formulation(
+            read_or_make_task(self.params.task, self.context), self.params.formulation
+        )[1]
 
     def _report_validity(self, plan: PlannedJump) -> ValidityReport | None:
         """Return the validity report of a plan that need not be valid; ``None`` if it must be valid."""
@@ -424,8 +442,9 @@ def _as_planned(task: JumpTask, chosen: Literal["full", "paper", "srbm"] | None)
     """Return the task in the formulation ``chosen``, if there is one."""
     if chosen is None:
         return task
-    impact = task.impact and chosen == "full"
-    return task.model_copy(update={"formulation": chosen, "impact": impact})
+    from ...planner.task.boundary_set import in_formulation
+
+    return in_formulation(task, chosen)[0]
 
 
 def _is_file_of(name: str, context: Context) -> bool:

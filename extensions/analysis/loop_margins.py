@@ -7,7 +7,8 @@ come from the eigenvalues of L(w), the characteristic loci: a delay tau in all c
 the loop to its limit where an eigenvalue times exp(-i w tau), or the factor, is 1 (MacFarlane and
 Postlethwaite, 1977). The disk margin of all channels is that for perturbations of any structure,
 alpha = 2 / max sigma(S - T), which bounds that of separate perturbations from below (Seiler, Packard and
-Gahinet, An Introduction to Disk Margins, 2020).
+Gahinet, An Introduction to Disk Margins, 2020). Gains at which the loop becomes unstable are confirmed by the
+poles of the closed loop, and found at frequency 0 and half the sampling rate, too; see ``gain_limits``.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...runtime.language.errors import AloftError
+from .gain_limits import ON_CIRCLE, ClosedLoop
 from .linearisation import Linearisation, import_control, sorted_poles
 
 if TYPE_CHECKING:
@@ -32,8 +34,8 @@ POINTS = 1000
 """Frequencies at which the response is computed, evenly in their logarithm."""
 DECADES = 4.0
 """Decades from the lowest frequency to the highest, half the sampling rate."""
-ON_CIRCLE = 1e-6
-"""A pole that is no farther outside of the unit circle than this is taken to lie on it: drift."""
+NEAR_HALF = (0.995, 0.998, 0.999, 0.9995, 0.9999, 1.0)
+"""Shares of half the sampling rate at which the response is computed beyond those."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +43,8 @@ class LoopMargins:
     """The margins of one loop; infinite where nothing brings it to its limit.
 
     Attributes:
-        gain_up, gain_down: the factors on the loop's gain at which it becomes unstable: the least above
-            1, and the greatest below it, 0 where there is none.
+        gain_up, gain_down: the factors on the loop's gain at which a pole of the closed loop leaves the
+            unit circle, or comes back to it: the least above 1, and the greatest below it, 0 where there is none.
         phase: the least lag that it does not stand [deg].
         delay: the least delay that it does not stand [s].
         crossover: the frequency of the phase margin [rad/s]; ``nan`` where there is none.
@@ -114,10 +116,18 @@ def margins(model: Linearisation) -> Margins:
     samples = len(model.inputs) / len(names)  # in a period
     highest = np.log10(np.pi * samples / model.period)
     w = np.logspace(highest - DECADES, highest, POINTS)[:-1]
+    w = np.concatenate([w, 10.0**highest * np.array(NEAR_HALF)])
     transfer, loops = model.response(w), loop_responses(model, w)
+    columns = {
+        name: [k for k, each in enumerate(model.inputs) if each.partition("@")[0] == name]
+        for name in names
+    }
     return Margins(
-        {name: _of_channel(w, loops[:, k]) for k, name in enumerate(names)},
-        _of_all(w, transfer),
+        {
+            name: _of_channel(w, loops[:, k], ClosedLoop(model, columns[name], float(w[0])))
+            for k, name in enumerate(names)
+        },
+        _of_all(w, transfer, ClosedLoop(model, range(n), float(w[0]))),
         bool((np.abs(poles) <= 1.0 + ON_CIRCLE).all()),
         float(np.log(max(np.abs(poles).max(initial=0.0), 1e-300)) / model.period),
         poles,
@@ -147,27 +157,27 @@ def _each_alone(transfer: Any) -> Any:
     return found
 
 
-def _of_channel(w: Array, loop: Any) -> LoopMargins:
+def _of_channel(w: Array, loop: Any, closed: ClosedLoop) -> LoopMargins:
     """Return the margins of one transfer with negative feedback."""
     control = import_control()
-    response = control.FrequencyResponseData(loop, w, smooth=True)
+    response = control.FrequencyResponseData(loop[:-1], w[:-1], smooth=True)
     gains, phases, _, _, crossings, _ = control.stability_margins(response, returnall=True)
     lags = np.mod(np.atleast_1d(phases), 360.0)  # a lag of 350 degrees is a lead of 10
     leads = np.minimum(lags, 360.0 - lags)
     delays = np.radians(lags) / np.atleast_1d(crossings)
     first = int(np.argmin(leads)) if len(leads) else -1
     return _margins(
-        np.atleast_1d(gains), float(leads.min(initial=np.inf)), float(delays.min(initial=np.inf)),
+        closed.limits(np.atleast_1d(gains)), float(leads.min(initial=np.inf)), float(delays.min(initial=np.inf)),
         float(np.atleast_1d(crossings)[first]) if len(leads) else np.nan,
         w, 1.0 / (1.0 + loop)[:, None, None],
     )  # fmt: skip
 
 
-def _of_all(w: Array, transfer: Any) -> LoopMargins:
+def _of_all(w: Array, transfer: Any, closed: ClosedLoop) -> LoopMargins:
     """Return the margins for the same change in all channels, by the characteristic loci."""
     from scipy.optimize import linear_sum_assignment
 
-    loci = np.linalg.eigvals(transfer)
+    loci = np.linalg.eigvals(transfer[:-1])
     for k in range(1, len(loci)):  # in the order of the frequency before
         distance = np.abs(loci[k - 1][:, None] - loci[k])
         loci[k] = loci[k, linear_sum_assignment(distance)[1]]
@@ -190,21 +200,21 @@ def _of_all(w: Array, transfer: Any) -> LoopMargins:
     n = transfer.shape[1]
     sensitivity = np.linalg.inv(np.eye(n) - transfer)
     return _margins(
-        np.array(gains), min(phases, default=np.inf), min(delays, default=np.inf),
+        closed.limits(np.array(gains)), min(phases, default=np.inf), min(delays, default=np.inf),
         crossings[first] if phases else np.nan, w, sensitivity,
     )  # fmt: skip
 
 
 def _margins(
-    gains: Array, phase: float, delay: float, crossover: float, w: Array, sensitivity: Any
-) -> LoopMargins:
+    gains: tuple[float, float], phase: float, delay: float, crossover: float, w: Array,
+    sensitivity: Any,
+) -> LoopMargins:  # fmt: skip
     peak = np.linalg.norm(sensitivity, 2, axis=(1, 2))
     # with T = I - S, the disk margin's S - T is 2 S - I
     disk = np.linalg.norm(2.0 * sensitivity - np.eye(sensitivity.shape[1]), 2, axis=(1, 2))
     at = int(peak.argmax())
     return LoopMargins(
-        float(gains[gains > 1.0].min(initial=np.inf)), float(gains[gains < 1.0].max(initial=0.0)),
-        phase, delay, crossover, float(2.0 / disk.max()), float(peak[at]), float(w[at]),
+        *gains, phase, delay, crossover, float(2.0 / disk.max()), float(peak[at]), float(w[at]),
     )  # fmt: skip
 
 

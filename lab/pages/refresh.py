@@ -46,6 +46,7 @@ from result_tables import (
 
 from aloft.extensions.commissioning.reach.reach import BRUCE, beside
 from aloft.lab.benchmarks.tick.chart import tick_chart
+from aloft.planner.task.boundary_set import BoundarySet
 from aloft.planner.task.margins import Margins
 from aloft.planner.task.sequence import Hop, KnownStairs, PhaseSpec, RoughGround
 from aloft.planner.task.task import JumpTask, Knots, Weights
@@ -209,6 +210,7 @@ def task_parameter_tables() -> str:
         ("`knots`", Knots),
         ("`weights`", Weights),
         ("`margins`", Margins),
+        ("`bounds`", BoundarySet),
     ):
         head = f"{title}:\n\n" if title else ""
         names = ("parameter", "unit", "default", "bounds", "")

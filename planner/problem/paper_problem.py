@@ -4,7 +4,10 @@ Decision variables, integration, cost and constraints are those of equations (1)
 section; the pieces below have them. What the paper leaves open is chosen so:
 
 - The boundary set Q holds the paper's examples, r[1], r[N], the heights in stance and in flight and
-  the take-off velocity; also joint limits, rest at both ends, and the base's pose at the end.
+  the take-off velocity; also joint limits, rest at both ends, and the base's pose at the end. A task may add
+  bounds on attitude (``margins.squat_lean``, ``margins.landing_lean``, ``touchdown_lean``), joints
+  (``margins.joints``, ``margins.landing_limits``), momentum (``lift_off_momentum``, ``touchdown_momentum``) and, by
+  ``bounds``, on joint velocities, forces and momentum at all times.
 - dt is fixed, the same within every phase. The flight lasts as long as the ballistic flight of the
   asked rise from standing height to standing height takes.
 - The friction cone, printed with a squared F_z, is sqrt(F_x^2 + F_y^2) <= mu F_z.
@@ -41,6 +44,7 @@ from ..models import simple_models as centroidal
 from ..models.euler_angles import pose_of
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
+from ..task.margins import joint_bounds
 from ..task.phase import Phase
 from ..task.task import JumpTask
 from .assembly import Knot
@@ -249,7 +253,12 @@ class PaperProblemBuilder:
         if k in (0, self.last):
             return
         at = int(self.fill.assembly.state_start[k])
+        margins = self.task.margins
         limits = self.model.robot.joint_limits
+        if margins is not None:
+            limits = joint_bounds(self.model.robot, margins, k >= self.touchdown)
+        self._bound_lean(k, at + 3)
+        self._bound_momentum(k, at + self.nq + 6)
         self.fill.lower[at + 7 : at + self.nq] = limits[:, 0]
         self.fill.upper[at + 7 : at + self.nq] = limits[:, 1]
         height = at + self.nq + 2
@@ -261,6 +270,44 @@ class PaperProblemBuilder:
             self.fill.upper[height] = nominal + self.up**2 / (2.0 * GRAVITY)
         elif self.touchdown < k < self.last - 1:  # at rest it is there anyway
             self.fill.upper[height] = landing
+
+    def _bound_lean(self, k: int, quaternion: int) -> None:
+        """Bound the torso's lean: with the quaternion x, y, z, w it is at most twice the arc sine of |(x, y)|."""
+        margins, largest = self.task.margins, []
+        if margins is not None:
+            largest.append(margins.squat_lean if k <= self.lift_off else None)
+            largest.append(margins.landing_lean if k >= self.touchdown else None)
+        largest.append(self.task.touchdown_lean if k == self.touchdown else None)
+        leans = [each for each in largest if each is not None]
+        if leans:
+            self._within(quaternion, 2, float(np.sin(0.5 * min(leans))))
+
+    def _bound_momentum(self, k: int, h: int) -> None:
+        task, bounds = self.task, self.task.bounds
+        largest = [
+            bounds.angular_momentum if bounds is not None else None,
+            task.lift_off_momentum if k == self.lift_off else None,
+            task.touchdown_momentum if k == self.touchdown else None,
+        ]
+        found = [each for each in largest if each is not None]
+        if found:
+            self._within(h, 3, min(found))
+
+    def _within(self, first: int, count: int, largest: float) -> None:
+        self.fill.lower[first : first + count] = -largest
+        self.fill.upper[first : first + count] = largest
+
+    def _bound_controls(self, k: int) -> None:
+        """Bound joint velocities and normal forces of knot k + 1."""
+        bounds, control = self.task.bounds, int(self.fill.assembly.control_start[k])
+        if bounds is not None and bounds.joint_velocity is not None:
+            self._within(control + 6, self.nv - 6, bounds.joint_velocity)
+        if self.grid.phases[k] is Phase.FLIGHT:
+            return
+        force = control + self.nv + 3
+        self.fill.lower[force + 2 : force + self.forces : 3] = 0.0
+        if bounds is not None and bounds.force is not None:
+            self.fill.upper[force + 2 : force + self.forces : 3] = bounds.force
 
     def _nominal(self, k: int) -> Array:
         """Return q_nom: standing, and in flight from one stance to the other at constant rates."""
@@ -282,8 +329,7 @@ class PaperProblemBuilder:
             common |= {"Q_f": FORCE_SCALE * weights.force, "friction": self.task.friction,
                        "place": self._stance_at(k + 1).points.ravel()}  # fmt: skip
             rates.append(("friction", self.forces // 3, 0.0, np.inf))
-            force = int(self.fill.assembly.control_start[k]) + self.nv + 3
-            self.fill.lower[force + 2 : force + self.forces : 3] = 0.0
+        self._bound_controls(k)
         self.fill.set(name, k, **common)
         self.fill.rows(name, k, rates)
 

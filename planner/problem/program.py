@@ -14,6 +14,7 @@ from ...mathematics.constants import GRAVITY
 from ..models.exact_dynamics import ExactDynamics, half_steps, joint_motions
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
+from ..task.boundary_set import unsupported_keys
 from ..task.files import PlanError
 from ..task.phase import Phase
 from ..task.task import JumpTask
@@ -62,14 +63,12 @@ def uniform_grid(task: JumpTask, flight_time: float) -> Grid:
 
 
 def check_supported(task: JumpTask) -> None:
-    """Raise ``PlanError`` for impacts, free times, several jumps and other sequences of contacts."""
+    """Raise ``PlanError`` for free times and for every key of the task that the formulation has nothing for."""
     asked = []
-    if task.impact:
-        asked.append("impact")
     for name in ("squat_time", "thrust_time", "landing_time"):
         if getattr(task, name) is None:
             asked.append(f"{name}: free")
-    asked += [name for name in ("jumps", "repeat", "phases") if getattr(task, name) is not None]
+    asked += unsupported_keys(task)
     if asked:
         raise PlanError(
             f"{task.name}: formulation {task.formulation!r} plans one flight with given times and "

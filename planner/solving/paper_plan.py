@@ -23,6 +23,8 @@ from .solver_process import cpu_time
 
 LIMIT = 500
 """Iterations; without weights on accelerations the problem needs many."""
+WARM_BARRIER = 1e-3
+"""The barrier's parameter to begin with near a plan of another task."""
 
 
 def paper_problem(
@@ -49,24 +51,70 @@ def paper_problem(
 def solve_paper(task: JumpTask, robot: RobotDescription, options: SolveOptions) -> PlannedJump:
     """Return the plan of a task as the paper would make it; see ``solve_jump``.
 
-    A ``warm_start`` is not used. IPOPT is tried first: the equations have index three, as the
-    centre of mass is tied to the joints by position, and fatrop more often ends early.
+    IPOPT is tried first: the equations have index three, as the
+    centre of mass is tied to the joints by position, and fatrop more often ends early. From a ``warm_start``, a plan in
+    any formulation, IPOPT begins near it; where it finds nothing from there, it begins anew.
     """
     started = cpu_time()
     if options.knots is not None:
         task = task.model_copy(update={"knots": options.knots})
     problem = paper_problem(task, robot, compiled=options.compiled, progress=options.progress)
     tries = [options.solver] if options.solver else ["ipopt", "fatrop"]
-    for name in tries:
-        solution = solve(problem, problem.guess, solver=name, limit=LIMIT)
+    starts = [(name, problem.guess, False) for name in tries]
+    if options.warm_start is not None and options.warm_start.touchdown_time > 0.0:
+        starts.insert(0, (tries[0], variables_near(problem, options.warm_start), True))
+    for name, guess, warm in starts:
+        solution = solve(problem, guess, warm=warm, barrier=WARM_BARRIER, solver=name, limit=LIMIT)
         if solution.solved:
             break
     else:
         raise failure(task, solution)
-    statistics = statistics_of(problem, solution)
+    statistics = statistics_of(problem, solution) | {"warm": warm}
     arrays = unpack(problem, solution.values, robot)
     statistics["cpu_s"] = cpu_time() - started
     return PlannedJump(task=task, statistics=statistics, versions=versions(), **arrays)
+
+
+def variables_near(problem: SimpleProblem, plan: PlannedJump) -> Array:
+    """Return variables of the paper's problem near a plan of a task like it: read at the same share of the time before
+    lift-off, of the flight, or of the landing. Accelerations and forces are those of the interval before a knot."""
+    grid, found = problem.grid, problem.guess.copy()
+    mine = np.array(
+        [0.0, grid.times[grid.flight.start], grid.times[grid.flight.stop], grid.times[-1]]
+    )
+    theirs = np.array([0.0, plan.lift_off_time, plan.touchdown_time, plan.time[-1]])
+    times = np.interp(grid.times, mine, theirs)
+    stretch = np.diff(theirs) / np.diff(mine)
+    turn = matrices_of_quaternions(plan.position[:, 3:7])
+    world = np.einsum("kij,kj->ki", turn, plan.velocity[:, :3])  # the plan's is in the body's axes
+    velocity = np.column_stack([world, plan.velocity[:, 3:]])
+
+    def at(values: Array, time: float) -> Array:
+        return np.array([np.interp(time, plan.time, column) for column in values.T])
+
+    force = plan.contact_force.reshape(len(plan.time), -1)
+    for k, time in enumerate(times):
+        start = int(problem.assembly.state_start[k])
+        position = at(plan.position, time)
+        position[3:7] /= np.linalg.norm(position[3:7])
+        part = min(int(np.searchsorted(mine[1:], grid.times[k], side="right")), 2)
+        rate = stretch[part]
+        speed = rate * at(plan.com_velocity, time)
+        state = np.concatenate(
+            [position, at(plan.com, time), speed, at(plan.angular_momentum, time)]
+        )
+        found[start : start + len(state)] = state
+        if k == problem.knots - 1:
+            break
+        control, later = int(problem.assembly.control_start[k]), times[k + 1]
+        length = float(grid.times[k + 1] - grid.times[k])
+        gain = (rate * at(plan.com_velocity, later) - speed) / length
+        values = [rate * at(velocity, later), gain]
+        if grid.phases[k] is not Phase.FLIGHT:
+            values.append(at(force, 0.5 * (time + later)))
+        values = np.concatenate(values)
+        found[control : control + len(values)] = values
+    return np.clip(found, problem.lower, problem.upper)
 
 
 def unpack(problem: SimpleProblem, values: Array, robot: RobotDescription) -> dict[str, Any]:

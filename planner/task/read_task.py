@@ -24,6 +24,7 @@ from ...robots.kinematics import (
     standing_heights,
 )
 from ...robots.shapes import corners_of
+from .boundary_set import unsupported_keys
 from .contact_groups import contact_points, wrong_groups
 from .files import JumpTaskError, read_located
 from .margins import unknown_joints
@@ -136,6 +137,7 @@ def contradictions(task: JumpTask, robot: RobotDescription) -> list[Contradictio
     """Return all contradictions of the task, in the order of its parameters."""
     return [
         *_unknown_names(task, robot),
+        *_unsupported(task),
         *_contact_phases(task, robot),
         *_flight(task, robot),
         *_edge(task, robot),
@@ -152,6 +154,16 @@ def require_consistent(task: JumpTask, robot: RobotDescription) -> None:
     found = contradictions(task, robot)
     if found:
         raise JumpTaskError("\n".join(f"{task.name}: {key}: {text}" for key, text in found))
+
+
+def _unsupported(task: JumpTask) -> Iterator[Contradiction]:
+    """Yield what the task's formulation has nothing for; it would be ignored."""
+    other = "paper" if task.formulation == "full" else "full"
+    for key in unsupported_keys(task):
+        yield (
+            key,
+            f"formulation {task.formulation} has nothing for it; leave it out, or use formulation: {other}",
+        )
 
 
 def _unknown_names(task: JumpTask, robot: RobotDescription) -> Iterator[Contradiction]:
@@ -197,11 +209,6 @@ def _contact_phases(task: JumpTask, robot: RobotDescription) -> Iterator[Contrad
     yield from wrong
     for key in ("take_off", "touchdown"):
         named = contact_points(robot, getattr(task, key) or ())
-        if named and task.formulation != "full":
-            yield (
-                key,
-                f"formulation {task.formulation} lifts all feet at once; use formulation: full",
-            )
         if named and not wrong and len(named) == len(robot.contacts):
             yield (
                 key,

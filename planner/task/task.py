@@ -20,6 +20,7 @@ from ...files.problems import nearest
 from ...files.validation import describe, names_at
 from ...robots.description import RobotDescription
 from ...runtime.language.parameters import Parameters, parameter
+from .boundary_set import BoundarySet
 from .contact_groups import in_turn, wrong_times
 from .files import JumpTaskError, LocatedFile
 from .margins import Margins
@@ -215,6 +216,10 @@ class JumpTask(FreeTimes):
     weights: Weights = parameter(Weights(), text="weights of the cost")
     margins: Margins | None = parameter(
         None, text="room that the plan leaves to the feedback; None: only 5 mrad at the joints"
+    )
+    bounds: BoundarySet | None = parameter(
+        None,
+        text="formulation paper: bounds on speeds, forces and momentum, in place of motors; None: none",
     )
     moving: tuple[str, ...] | None = parameter(
         None, min_length=1,

@@ -325,6 +325,7 @@ class Executor:
             except Exception as failure:  # noqa: BLE001  # the other blocks' metrics still count
                 problems.append(f"block '{path}' failed in metrics: {describe(failure)}")
         metrics, unmet, success_reason = merge_metrics(by_block)
+        unmet = unmet or self._too_late(ticks)
         judges = [path for path, of_block in by_block.items() if of_block.get("reason")]
         unmet, success_reason = (
             self._with_stop(unmet, judges),
@@ -353,6 +354,16 @@ class Executor:
             parameter_changes=tuple(self.bound.parameters.changes),
             log=self._log,
             graph=self.bound.graph,
+        )
+
+    def _too_late(self, ticks: int) -> str | None:
+        """Return why a run with so many late ticks is no success, where its graph has a limit."""
+        pacer, share = self.ticker.pacer, self.ticker.policy.late_share
+        if pacer is None or share is None or pacer.lateness.late <= share * ticks:
+            return None
+        return (
+            f"{pacer.lateness.late} of {ticks} ticks began late, at most {100.0 * share:g} % may "
+            "(clock.late_share)"
         )
 
     def _times_of(self, path: str) -> BlockTimes:

@@ -86,6 +86,11 @@ class SteppedRun:
         return self.tick * self._bound.clock.base_period
 
     @property
+    def stopped(self) -> bool:
+        """Whether a block has asked for the end, also in the last tick of the graph's duration."""
+        return self._bound.clock.stop_reason is not None
+
+    @property
     def reason(self) -> str:
         """Reason why the run has ended; empty while it may go on."""
         if self._bound.clock.stop_reason is not None:

@@ -5,6 +5,7 @@ from textwrap import dedent, indent
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 import aloft
 from aloft.extensions.analysis import linearise, margins
@@ -12,14 +13,14 @@ from aloft.extensions.analysis import linearise, margins
 T, K = 0.01, 30.0
 
 
-def loop(delay: int = 0, channels: int = 1, rate: str = "") -> aloft.Graph:
+def loop(delay: int = 0, channels: int = 1, rate: str = "", gain: float = K) -> aloft.Graph:
     """u = -K x, x' = u, with x by Euler's method: L = -K T / (z - 1) z^-delay."""
     wire = f"{{from: k.y, delay: {delay}}}" if delay else "k.y"
     return aloft.load(
         "rate: 100 Hz\nblocks:\n"
         + indent(
             dedent(f"""
-      k: {{use: blocks.Gain, {rate} with: {{n: {channels}, gain: {-K}, unit: 1/s}}, in: {{u: x.y}}}}
+      k: {{use: blocks.Gain, {rate} with: {{n: {channels}, gain: {-gain}, unit: 1/s}}, in: {{u: x.y}}}}
       x: {{use: blocks.Integrator, with: {{n: {channels}, initial: {[1.0] * channels}}}, in: {{u: {wire}}}}}
     """),
             "  ",
@@ -43,11 +44,59 @@ def test_an_integrator_with_delay_has_the_margins_of_its_formula(delay: int, cha
         assert each.crossover == pytest.approx(crossover, rel=1e-3)
         assert each.phase == pytest.approx(np.degrees(phase), abs=0.1)
         assert each.delay == pytest.approx(phase / crossover, rel=2e-3)
-        if delay:
-            assert each.gain_up == pytest.approx(gain, rel=2e-3)
+        assert each.gain_up == pytest.approx(gain, rel=2e-3)
         assert each.gain_down == 0.0
     assert found.stable
     assert len(found.channels) == channels
+
+
+@pytest.mark.parametrize("gain", [30.0, 100.0, 190.0, 199.0, 201.0, 220.0])
+def test_a_limit_at_half_the_rate_is_found(gain: float) -> None:
+    """z = 1 - K T leaves the circle at -1, where K T = 2."""
+    found = margins(linearise(loop(gain=gain), inputs="k.y", outputs="k.y", at=0.1, opened=True))
+    limit = 2.0 / (gain * T)
+    for each in (*found.channels.values(), found.together):
+        assert (each.gain_up, each.gain_down) == (
+            (pytest.approx(limit, rel=1e-5), 0.0)
+            if limit > 1.0
+            else (np.inf, pytest.approx(limit, rel=1e-5))
+        )
+        # there S = 1 / (1 - K T / 2)
+        assert each.disk <= 2.0 / abs(2.0 / (1.0 - gain * T / 2.0) - 1.0) * (1.0 + 1e-4)
+    assert found.stable == (limit > 1.0)
+
+
+def pendulum(gain: float, channels: int = 1) -> aloft.Graph:
+    """x'' = x + u, u = -k (3 x + x'), sampled exactly: stable from k = 1/3 to 200."""
+    exact = scipy.linalg.expm(T * np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 0.0, 0.0]]))
+    a, b = exact[:2, :2].tolist(), exact[:2, 2:].tolist()
+    return aloft.load(f"""
+rate: 100 Hz
+blocks:
+  k: {{use: blocks.Gain, with: {{n: 1, gain: {-gain}}}, in: {{u: x.y}}}}
+  x: {{use: blocks.StateSpace, with: {{a: {a}, b: {b}, c: [[3.0, 1.0]], initial: [0.0, 0.0]}}, in: {{u: k.y}}}}
+""")
+
+
+@pytest.mark.parametrize("gain", [0.34, 1.0, 100.0, 190.0])
+def test_a_loop_that_needs_its_gain_has_a_limit_at_frequency_zero(gain: float) -> None:
+    found = margins(linearise(pendulum(gain), inputs="k.y", outputs="k.y", at=0.1, opened=True))
+    for each in (*found.channels.values(), found.together):
+        assert each.gain_down == pytest.approx(1.0 / 3.0 / gain, rel=1e-5)
+        assert each.gain_up == pytest.approx(200.0016669 / gain, rel=1e-5)
+
+
+def test_limits_of_a_channel_beside_others_are_its_own() -> None:
+    """Two integrators, of which one has twice the gain: each channel by itself, and both at once."""
+    graph = aloft.load("""
+rate: 100 Hz
+blocks:
+  k: {use: blocks.Gain, with: {n: 2, gain: [-50.0, -100.0], unit: 1/s}, in: {u: x.y}}
+  x: {use: blocks.Integrator, with: {n: 2, initial: [1.0, 1.0]}, in: {u: k.y}}
+""")
+    found = margins(linearise(graph, inputs="k.y", outputs="k.y", at=0.1, opened=True))
+    assert [each.gain_up for each in found.channels.values()] == pytest.approx([4.0, 2.0])
+    assert found.together.gain_up == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize(("extra", "stable"), [(4, True), (5, False)])

@@ -18,7 +18,7 @@ from ....hal.sitting import sitting_path
 from ....mathematics.arrays import Array
 from .session import Request, Session, StepReport
 
-STAND, HOP = "bring_up_stand.yaml", "bring_up_hop.yaml"
+STAND, HOP = "aloft:commissioning/bring_up_stand", "aloft:commissioning/bring_up_hop"
 """The graphs of these steps."""
 SQUAT_DEPTH = 0.05
 """Depth of the squat [m]."""

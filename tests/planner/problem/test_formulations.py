@@ -166,6 +166,43 @@ def test_what_only_full_can_do_is_refused(
         solve_jump(task, ROBOT)
 
 
+@pytest.mark.long
+def test_the_papers_boundary_set_may_bound_attitude_velocity_force_and_momentum() -> None:
+    bounds = {"joint_velocity": 22.0, "force": 26.0, "angular_momentum": 0.3}
+    margins = {"squat_lean": 0.8, "landing_lean": 0.15, "joints": 0.05}
+    values = {
+        "recipe": "paper", "name": "bounded", "formulation": "paper", "rise": 0.08, "knots": COARSE,
+        "margins": margins, "bounds": bounds, "lift_off_momentum": 0.1, "touchdown_momentum": 0.1,
+    }  # fmt: skip
+    plan = solve_jump(make_task(values), ROBOT)
+    up, down = knot(plan, plan.lift_off_time), knot(plan, plan.touchdown_time)
+    lean = 2.0 * np.arcsin(np.abs(plan.position[:, 3:5]).max(axis=1))
+    tolerance = 1e-4
+    assert lean[: up + 1].max() <= margins["squat_lean"] + tolerance
+    assert lean[down:-1].max() <= margins["landing_lean"] + tolerance
+    assert np.abs(plan.velocity[:, 6:]).max() <= bounds["joint_velocity"] + tolerance
+    assert plan.contact_force[..., 2].max() <= bounds["force"] + tolerance
+    assert np.abs(plan.angular_momentum).max() <= bounds["angular_momentum"] + tolerance
+    assert np.abs(plan.angular_momentum[[up, down]]).max() <= 0.1 + tolerance
+    limits = ROBOT.joint_limits + np.array([0.05, -0.05])
+    assert (plan.position[1:-1, 7:] >= limits[:, 0] - tolerance).all()
+    assert (plan.position[1:-1, 7:] <= limits[:, 1] + tolerance).all()
+
+
+@pytest.mark.long
+def test_the_papers_problem_starts_from_a_plan_of_a_near_task() -> None:
+    near = planned("paper", "in situ")
+    values = {
+        "recipe": "paper", "name": "near", "formulation": "paper", "rise": 0.14, "knots": COARSE,
+    }  # fmt: skip
+    cold = solve_jump(make_task(values), ROBOT)
+    warm = solve_jump(make_task(values), ROBOT, warm_start=near)
+    assert warm.statistics["warm"]
+    assert not cold.statistics["warm"]
+    assert warm.statistics["iterations"] < cold.statistics["iterations"]
+    assert warm.statistics["cost"] == pytest.approx(cold.statistics["cost"], rel=1e-3)
+
+
 def test_legs_that_do_not_reach_are_named() -> None:
     task = make_task(
         {"recipe": "paper", "name": "far", "rise": 0.1, "distance_x": 0.9, "formulation": "srbm"}

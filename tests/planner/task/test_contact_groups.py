@@ -84,7 +84,7 @@ def test_a_plan_is_kept_under_the_same_hash_whether_or_not_feet_could_leave_in_t
     [
         ({"take_off": {"FX": 0.1}}, "take_off.FX", "like 'FX'; there is FL, FR, RL, RR, or a side: fore, hind"),
         ({"take_off": {"fore": 0.1, "hind": 0.05}}, "take_off", "names all contact points of go2"),
-        ({"take_off": {"fore": 0.1}, "formulation": "srbm"}, "take_off", "formulation srbm lifts all feet at once"),
+        ({"take_off": {"fore": 0.1}, "formulation": "srbm"}, "take_off", "formulation srbm has nothing for it"),
         ({"phases": [{"phase": "thrust"}, {"phase": "thrust", "contacts": "toe"}, {"phase": "flight"},
                      {"phase": "landing"}]}, "phases.1.contacts", "like 'toe'"),
     ],
