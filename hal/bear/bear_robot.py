@@ -226,9 +226,7 @@ class BearRobot(DrivenRobot):
         if self._watchdog is not None:
             self._watchdog.close()
         self._switch.close()
-        if self.driver is not None:
-            self.waits_for_others = True  # no hang: it has a limit of its own
-            self.driver.close()
+        DrivenRobot.close(self)
 
     def _stop_reason(self) -> str:
         """Return the reason why the motor thread must not go on; empty if it may."""
