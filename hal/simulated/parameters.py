@@ -49,6 +49,11 @@ class StartParameters(Parameters):
     random_start_phase: bool = parameter(
         False, text="start physics at a drawn phase of the control clock"
     )
+    stand: bool = parameter(
+        True,
+        text="whether a robot with feet, or on a fixed base, must stay as it starts; if not, it is put down in its standing "
+        "pose, begins from rest and falls if it falls, as one without feet does",
+    )
     gantry: GantryParameters | None = parameter(
         None, text="a gantry in which the robot hangs at the start; none: it stands"
     )

@@ -47,6 +47,7 @@ from .stance import (
     holding_gains,
     holding_torque,
     passive_joints,
+    put_down,
     set_standing_pose,
 )
 from .state import (
@@ -242,7 +243,11 @@ class Plant:
             bool(self.variation.link_length),
         )
         normal = self._params.build_scene(robot).normal(0.0, 0.0)
-        set_standing_pose(model, data, base, robot, tilt, level, normal)
+        if params.start.stand:
+            set_standing_pose(model, data, base, robot, tilt, level, normal)
+        else:
+            put_down(model, data, base, robot, tilt)
+        placed = data.qpos.copy()
         if self.gantry is not None and params.start.gantry is not None:
             base.shift(np.array([0.0, 0.0, params.start.gantry.height]))
             mujoco.mj_kinematics(model, data)
@@ -264,7 +269,12 @@ class Plant:
         self.clear_record()
         self._settle(step, observed)
         load = self.record.load[:, 3] / -observed
-        StartCheck(model, data, base, robot, hangs).check(load, pose, torque, rotation)
+        check = StartCheck(model, data, base, robot, hangs)
+        if not params.start.stand or (check.may_fall and not check.stays(pose)):
+            data.qpos[:], data.qvel[:], data.qacc_warmstart[:] = placed, 0.0, 0.0
+            mujoco.mj_kinematics(model, data)
+        else:
+            check.check(load, pose, torque, rotation)
         if not hangs:
             centre_on_origin(data, base, robot)
         self.data.time = 0.0
