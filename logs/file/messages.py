@@ -67,6 +67,8 @@ class Content(IntEnum):
     """Any of these, in a file without seals."""
     INDEX = 7
     """Index of all other messages, for Rerun's tools."""
+    HELD = 8
+    """Large fields of slow blocks, in the ticks in which these ran."""
 
 
 @dataclass(frozen=True)
@@ -313,9 +315,14 @@ def _checked(place: int, head: bytes, body: bytes, known: int) -> FileMessage | 
 
 def _named(damage: Damage, found: list[FileMessage]) -> Damage:
     """Return the damage with the ticks around it."""
-    rows = [m for m in found if m.content is Content.ROWS]
-    after = max((m.last for m in rows if m.place < damage.begin), default=None)
-    before = min((m.first for m in rows if m.place >= damage.end), default=None)
+    afters, befores = [], []
+    for kind in (Content.ROWS, Content.HELD):
+        parts = [m for m in found if m.content is kind]
+        if parts or kind is Content.ROWS:
+            afters.append(max((m.last for m in parts if m.place < damage.begin), default=None))
+            befores.append(min((m.first for m in parts if m.place >= damage.end), default=None))
+    after = None if None in afters else min(tick for tick in afters if tick is not None)
+    before = None if None in befores else max(tick for tick in befores if tick is not None)
     return replace(damage, after=after, before=before)
 
 
