@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 from ...mathematics.compiling.kernel_call import KernelCall
-from ...mathematics.compiling.kernel_registry import is_kernel
 from ..language.block import Block
 from ..language.errors import ExitCode, RunError
 from ..language.stages import BlockSpec, CheckedGraph
@@ -49,22 +47,3 @@ def mistake_of(spec: BlockSpec, block: Block) -> str:
             place = f"{spec.where}: " if spec.where is not None else ""
             return f"{place}block '{spec.path}': {text}"
     return ""
-
-
-def mistakes_of(graph: CheckedGraph) -> dict[str, str]:
-    """Return the mistakes in the kernels and in ``setup`` of users' blocks that have compiled steps, by
-    block. Each is set up by itself, with the defaults of its inputs."""
-    from .memory import BoundGraph
-
-    found: dict[str, str] = {}
-    for spec in graph.blocks:
-        kind = spec.block_type
-        if kind.__module__.startswith(OWN) or not any(map(is_kernel, kind.named_steps.values())):
-            continue
-        alone = replace(graph, blocks=(replace(spec, wires={}),), order=(spec.path,))
-        try:
-            BoundGraph(alone)
-        except RunError as error:
-            if error.exit_code == ExitCode.BAD_INPUT:
-                found[spec.path] = str(error)
-    return found

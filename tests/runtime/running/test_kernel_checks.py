@@ -8,7 +8,7 @@ import pytest
 
 import aloft
 from aloft.runtime.language.errors import ExitCode, RunError
-from aloft.runtime.running.kernel_checks import mistakes_of
+from aloft.runtime.running.block_mistakes import mistakes_of
 from aloft.runtime.running.memory import BoundGraph
 
 BLOCK = '''
