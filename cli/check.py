@@ -45,6 +45,9 @@ def check(
         from ..runtime.transports.registry import open_endpoints
 
         warnings = open_endpoints(checked.machines)
+    from ..runtime.running.block_mistakes import tied_to_machine
+
+    warnings += tied_to_machine(checked)
     from ..runtime.language.recording_cost import large_recording, recording_cost
 
     large = large_recording(checked)
