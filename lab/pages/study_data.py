@@ -27,7 +27,8 @@ DATA = "docs/data"
 PAGES: Mapping[str, tuple[str, ...]] = {
     "paper_controller": ("docs/comparisons.md",),
     "paper_factors": ("docs/comparisons.md",),
-    "paper_pushes": ("docs/landing.md", "docs/comparisons.md"),
+    "paper_polar": ("docs/landing.md",),
+    "paper_pushes": ("docs/landing.md",),
 }
 CONTROLLER = (
     "blocks",
