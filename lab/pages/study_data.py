@@ -8,7 +8,7 @@ which are stale.
     python lab/pages/study_data.py mark                            write that below the tables
 
 A data file is ``docs/data/STUDY.json``. Its table stands in the pages of ``PAGES`` between ``<!-- data: STUDY -->`` and
-``<!-- end of STUDY -->``, and a test holds the two together. A table is stale if the files in ``measures`` of its data
+``<!-- end of data: STUDY -->``, and a test holds the two together. A table is stale if the files in ``measures`` of its data
 file have changed since its commit. ``older`` are tables that were made before there were data files: their commit is
 that of their last change.
 """
@@ -113,7 +113,7 @@ def replaced(text: str, mark: str, inside: str) -> str:
     Raises:
         ValueError: the page does not have both marks.
     """
-    begin, end = f"<!-- data: {mark} -->\n", f"<!-- end of {mark} -->"
+    begin, end = f"<!-- data: {mark} -->\n", f"<!-- end of data: {mark} -->"
     before, found, rest = text.partition(begin)
     _, closed, after = rest.partition(end)
     if not (found and closed):
@@ -123,7 +123,7 @@ def replaced(text: str, mark: str, inside: str) -> str:
 
 def between(text: str, mark: str) -> str:
     """Return what stands between the marks of a data file; empty where they are not."""
-    return text.partition(f"<!-- data: {mark} -->\n")[2].partition(f"<!-- end of {mark} -->")[0]
+    return text.partition(f"<!-- data: {mark} -->\n")[2].partition(f"<!-- end of data: {mark} -->")[0]
 
 
 def git(root: Path, *arguments: str) -> str:
