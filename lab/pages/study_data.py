@@ -123,7 +123,9 @@ def replaced(text: str, mark: str, inside: str) -> str:
 
 def between(text: str, mark: str) -> str:
     """Return what stands between the marks of a data file; empty where they are not."""
-    return text.partition(f"<!-- data: {mark} -->\n")[2].partition(f"<!-- end of data: {mark} -->")[0]
+    return text.partition(f"<!-- data: {mark} -->\n")[2].partition(f"<!-- end of data: {mark} -->")[
+        0
+    ]
 
 
 def git(root: Path, *arguments: str) -> str:
