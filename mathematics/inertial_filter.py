@@ -17,6 +17,9 @@ from .elementary import atan2
 from .kernel import kernel
 from .rotations import integrate, normalise, rotate
 
+STARTING_RATE = 0.5
+"""A robot of which some points have no contact at the start stands on all if no rate [rad/s] is above this."""
+
 
 @kernel
 def propagate(
@@ -113,6 +116,7 @@ def orientation_from_gravity(specific_force: Array1D, orientation: Array1D) -> N
 def misalignment(
     orientation: Array1D,
     points: Array2D,
+    active: Flags1D,
     forward: Array1D,
     gradient: Array1D,
     out: Array1D,
@@ -123,26 +127,32 @@ def misalignment(
 
     A small rotation (a, b) about the world's x and y axes changes the height of a point at (x, y)
     relative to the points' mean by a y - b x; a and b are the least-squares solution over all
-    points. Where the points lie in one line the function returns False and the rotation is zero.
+    points that are active. Where they lie in one line the function returns False and the rotation is zero.
 
     Args:
+        active: the points to use, (n,).
         gradient: how much the ground rises along x and y, (2,); zeros: it is level.
         forward: the direction the feet point [body].
         place: scratch (3,).
     """
-    n = points.shape[0]
-    mean_x, mean_y, mean_z = 0.0, 0.0, 0.0
-    for i in range(n):
-        rotate(orientation, points[i], place)
-        mean_x += place[0] / n
-        mean_y += place[1] / n
-        mean_z += place[2] / n
+    mean_x, mean_y, mean_z, n = 0.0, 0.0, 0.0, 0.0
+    for i in range(points.shape[0]):
+        if active[i]:
+            rotate(orientation, points[i], place)
+            mean_x += place[0]
+            mean_y += place[1]
+            mean_z += place[2]
+            n += 1.0
+    n = max(n, 1.0)
+    mean_x, mean_y, mean_z = mean_x / n, mean_y / n, mean_z / n
     xx, xy, yy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(n):
-        rotate(orientation, points[i], place)
-        x, y, z = place[0] - mean_x, place[1] - mean_y, place[2] - mean_z
-        z -= gradient[0] * x + gradient[1] * y
-        xx, xy, yy, xz, yz = xx + x * x, xy + x * y, yy + y * y, xz + x * z, yz + y * z
+    for i in range(points.shape[0]):
+        if active[i]:
+            rotate(orientation, points[i], place)
+            x, y, z = place[0] - mean_x, place[1] - mean_y, place[2] - mean_z
+            z -= gradient[0] * x + gradient[1] * y
+            xx, xy, yy = xx + x * x, xy + x * y, yy + y * y
+            xz, yz = xz + x * z, yz + y * z
     determinant = xx * yy - xy * xy
     out[0] = out[1] = out[2] = 0.0
     if determinant <= 1e-4 * (xx + yy) * (xx + yy):
@@ -201,14 +211,18 @@ def correct_by_contacts(
     position_gain: float,
     position: Vector3,
     velocity: Vector3,
+    residual: Vector3,
 ) -> None:
     """Correct velocity and position by the points that stand still.
 
     Every active point has an anchor, at first the position at which it became active. If the point
     stands still, the base's velocity is minus the point's rate, and its position is the anchor
     minus the point's place. The weighted means of these two corrections are applied with the gains.
-    A point of low weight moves its anchor with it, so the anchor of a foot that has slipped is
-    where the foot came to rest.
+    A point of a weight below 1/4 moves its anchor with it, so the anchor of a foot that has slipped is
+    where the foot came to rest; any other anchor holds, however many ticks a second has.
+
+    Args:
+        residual: (3,) [m/s, world], the velocity's correction before its gain, written.
     """
     active, weights = points.active, points.weights
     anchors, anchored = points.anchors, points.anchored
@@ -223,13 +237,12 @@ def correct_by_contacts(
                 continue
             weight = weights[i]
             place = position[k] + points.places[i, k]
-            if anchored[i]:
-                anchors[i, k] += (1.0 - weight) * (place - anchors[i, k])
-            else:
+            if not anchored[i] or weight < 0.25:
                 anchors[i, k] = place
             still -= weight * (velocity[k] + points.rates[i, k])
             back += weight * (anchors[i, k] - place)
-        velocity[k] += velocity_gain * share * still
+        residual[k] = share * still
+        velocity[k] += velocity_gain * residual[k]
         position[k] += position_gain * share * back
     for i in range(weights.shape[0]):
         anchored[i] = active[i]

@@ -22,7 +22,7 @@ from aloft.runtime.language.extensions import (
 )
 
 ROOT = Path(aloft.__file__).parent
-JUMP_HASH = "d31774123e384526ed97e4ea3f36751e"
+JUMP_HASH = "d899a365a3d5b2eb445d93941b896d03"
 CHECK = """
 import json, sys
 from pathlib import Path
@@ -128,7 +128,10 @@ def test_what_a_declaration_names_is_there() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("verb = {}", "unknown key 'verb'; there is summary, page, extras, needs, verbs, provides"),
+        (
+            "verb = {}",
+            "unknown key 'verb'; there is summary, page, extras, needs, verbs, help, provides",
+        ),
         ("extras = 'x'", "extras: expected a list of texts, found 'x'"),
         ("verbs = {a = 1}", "verbs: expected a table of texts, found {'a': 1}"),
         ("summary", "extension.toml: "),

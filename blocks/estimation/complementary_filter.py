@@ -13,13 +13,14 @@ from .inertial_estimator import (
     InertialParameters,
     InertialScratch,
     LegKinematics,
+    correct_motion,
     count_standing,
     forget_samples,
     is_unaccelerated,
     learn_bias,
     predict,
+    publish,
     set_point_positions,
-    use_contacts,
 )
 
 
@@ -32,7 +33,7 @@ class ComplementaryFilter(InertialEstimator):
 
     and contact points that stand at a_i in the world, and at r_i(q) relative to the base, correct
     the velocity towards v = -R (J_i q' + w x r_i) and the position towards p = a_i - R r_i, with
-    the gains ``velocity_gain`` and ``position_gain`` per tick. All points in contact have equal
+    the gains ``velocity_gain`` and ``position_gain`` per second. All points in contact have equal
     weight. In contact the accelerometer corrects the tilt with ``tilt_gain`` whenever it reads
     about 1 g. The estimate of the gyroscope's bias is its mean while the robot stands still; the
     accelerometer's bias is not estimated. For flight and the world's origin see ``StateEstimator``.
@@ -60,13 +61,14 @@ class ComplementaryFilter(InertialEstimator):
         fastest = predict(imu, joints, estimate, legs, constants, scratch)
         if fastest < params.still_rate:
             learning.filling_sum[:] += scratch.gyro
-            learn_bias(learning, constants.block_size, estimate.gyro_bias, 10.0)
+            learn_bias(learning, constants, estimate.gyro_bias, 0.02)
         else:
             forget_samples(learning)
         if is_unaccelerated(scratch.force) and count_standing(points.active) > 0:
             correct_tilt_from_gravity(
-                estimate.orientation, scratch.force, params.tilt_gain, scratch.vector
+                estimate.orientation, scratch.force, constants.tilt_gain, scratch.vector
             )
         set_point_positions(estimate, legs)
         points.weights[:] = 1.0 if points.active else 0.0
-        use_contacts(estimate, legs, base, params, constants, scratch, 1.0, 1.0)
+        correct_motion(estimate, legs, params, constants, scratch, 1.0, 1.0)
+        publish(estimate, base)

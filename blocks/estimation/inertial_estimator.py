@@ -7,8 +7,9 @@ from typing import ClassVar, Literal, NamedTuple
 
 from ...mathematics.arrays import Array1D, Flags1D, Vector3
 from ...mathematics.constants import GRAVITY
-from ...mathematics.elementary import cos, sin
+from ...mathematics.elementary import atan2, cos, expm1, sin
 from ...mathematics.inertial_filter import (
+    STARTING_RATE,
     StandingPoints,
     correct_by_contacts,
     misalignment,
@@ -34,8 +35,8 @@ _FASTEST_TURN = 100.0
 _STRONGEST_FORCE = 1000.0
 _FASTEST_JOINT = 1000.0
 """Sensor values are limited to these [rad/s, m/s^2, rad/s], so that nothing can overflow."""
-_IMPACT = 0.05
-"""A change of the CoM's velocity in one tick [m/s] that ends a free fall."""
+_IMPACT = 25.0
+"""An acceleration of the CoM beyond gravity [m/s^2] that ends a free fall."""
 
 
 class BaseEstimate(Signal):
@@ -56,6 +57,7 @@ class BaseEstimate(Signal):
     )
     flight_ticks = Field(dtype="int64", text="ticks since the last trusted contact")
     started = Field(dtype="bool", text="the first sample has been seen")
+    stood = Field(dtype="bool", text="at the first sample all points stood on the ground")
 
 
 class BiasSamples(Signal):
@@ -78,13 +80,13 @@ class InertialParameters(Parameters):
         (0.0, 0.0), unit="rad", text="slope of the ground ahead and to the left at the start"
     )
     velocity_gain: float = live_parameter(
-        0.03, gt=0.0, le=1.0, text="gain of the legs' velocity correction, per tick"
+        15.0, unit="1/s", gt=0.0, text="gain of the legs' velocity correction"
     )
     position_gain: float = live_parameter(
-        0.05, gt=0.0, le=1.0, text="gain of the legs' position correction, per tick"
+        50.0, unit="1/s", gt=0.0, text="gain of the legs' position correction"
     )
     tilt_gain: float = live_parameter(
-        0.002, ge=0.0, le=1.0, text="gain of the accelerometer's tilt correction, per tick"
+        1.0, unit="1/s", ge=0.0, text="gain of the accelerometer's tilt correction"
     )
     still_rate: float = live_parameter(
         0.08,
@@ -98,8 +100,13 @@ class InertialConstants(Signal):
     """Numbers of the filter."""
 
     period = Field(unit="s", text="of a tick")
+    velocity_gain = Field(unit="", text="share of the legs' velocity correction in a tick")
+    position_gain = Field(unit="", text="share of the legs' position correction in a tick")
+    tilt_gain = Field(unit="", text="share of the accelerometer's tilt correction in a tick")
+    relaxing = Field(unit="", text="share by which the gate of speeds closes in a tick")
     filtering = Field(unit="", text="share of a change that the low-pass takes over in a tick")
     block_size = Field(dtype="int64", text="samples in a block from which a bias is learnt")
+    longest_mean = Field(dtype="int64", text="samples after which a bias is a running mean")
     starts_level = Field(dtype="bool", text="the contact points give the first tilt")
     gradient = Field(2, unit="", text="slope of the ground ahead and to the left at the start")
 
@@ -114,9 +121,11 @@ class InertialScratch(Signal):
     middle = Field(4, text="orientation in the middle of the tick")
     acceleration = Field(3, text="an acceleration, or a change of velocity")
     error = Field(3, text="a rotation vector")
+    residual = Field(3, unit="m/s", frame="world", text="of the velocity, by the points that stand")
     vector = Field(3, text="a vector")
     place = Field(("n_contacts", 3), unit="m", frame="world", text="points from the base")
     rate = Field(("n_contacts", 3), unit="m/s", frame="world", text="their velocities from there")
+    standing = Field("n_contacts", dtype="bool", text="points that stand at the start")
     weight = Field("n_contacts", unit="", text="trust in each point, 0 to 1")
 
 
@@ -136,7 +145,7 @@ class InertialEstimator(Block):
     and where it starts.
 
     The step of a derived class calls ``predict``, corrects the orientation, weighs the points, and
-    ends with ``use_contacts``.
+    ends with ``correct_motion`` and ``publish``.
     """
 
     Params = InertialParameters
@@ -173,8 +182,13 @@ class InertialEstimator(Block):
     def prepare(self) -> None:
         constants, period = self.constants, self.period
         constants.period = period
-        constants.filtering = min(period / 0.02, 1.0)
+        constants.velocity_gain = -expm1(-self.params.velocity_gain * period)
+        constants.position_gain = -expm1(-self.params.position_gain * period)
+        constants.tilt_gain = -expm1(-self.params.tilt_gain * period)
+        constants.relaxing = -expm1(-period / 0.02)
+        constants.filtering = -expm1(-period / 0.02)
         constants.block_size = max(round(0.03 / period), 1)
+        constants.longest_mean = max(round(2.0 / period), 1)
         constants.starts_level = self.starts_level
         for axis, angle in enumerate(self.params.slope):
             constants.gradient[axis] = sin(angle) / cos(angle)
@@ -228,31 +242,48 @@ def start(
     constants: InertialConstants,
     scratch: InertialScratch,
 ) -> None:
-    """Start with the robot standing at the origin, its feet heading along x."""
-    motion, error, vector = legs.motion, scratch.error, scratch.vector
+    """Start with the robot at the origin, its feet heading along x: standing on all points, or in a step."""
+    motion, points = legs.motion, legs.points
+    error, vector, standing = scratch.error, scratch.vector, scratch.standing
     orientation_from_gravity(scratch.force, estimate.orientation)
     contact_motion(
         legs.bodies, legs.contacts, estimate.orientation, estimate.angular_velocity, joints.position,
         scratch.joint_rates, motion,
     )  # fmt: skip
+    count = count_standing(points.active)
+    rate = max(largest_of(estimate.angular_velocity), largest_of(scratch.joint_rates))
+    stands = count == points.active.shape[0] or count == 0 or rate < STARTING_RATE
+    standing[:] = True
+    if not stands:
+        standing[:] = points.active
     for _ in range(20):
-        misalignment(
-            estimate.orientation, motion.points, motion.forward, constants.gradient, error, vector
-        )
+        flat = misalignment(
+            estimate.orientation, motion.points, standing, motion.forward, constants.gradient, error,
+            vector,
+        )  # fmt: skip
         limit(error, 0.2, error)
         if not constants.starts_level:
             error[0] = error[1] = 0.0
+        if not flat:
+            rotate(estimate.orientation, motion.forward, vector)
+            error[2] = max(min(-atan2(vector[1], vector[0]), 0.2), -0.2)
         rotate_in_world(estimate.orientation, error[0], error[1], error[2])
     for foot in range(motion.soles.shape[0]):
         rotate(estimate.orientation, motion.soles[foot], vector)
         estimate.position[:2] -= vector[:2] / motion.soles.shape[0]
-    for point in range(motion.points.shape[0]):
-        rotate(estimate.orientation, motion.points[point], vector)
-        x, y = estimate.position[0] + vector[0], estimate.position[1] + vector[1]
-        height = vector[2] - constants.gradient[0] * x - constants.gradient[1] * y
-        estimate.position[2] -= height / motion.points.shape[0]
+    set_point_positions(estimate, legs)
+    count = count_standing(standing)
+    for point in range(standing.shape[0]):
+        if standing[point]:
+            place = points.places[point]
+            x, y = estimate.position[0] + place[0], estimate.position[1] + place[1]
+            height = place[2] - constants.gradient[0] * x - constants.gradient[1] * y
+            estimate.position[2] -= height / count
+            if not stands:
+                estimate.velocity[:] -= points.rates[point] / count
     estimate.mean_joint_rate[:] = 1.0  # it counts as moving until it is seen at rest
     estimate.started = True
+    estimate.stood = stands
 
 
 @kernel
@@ -320,21 +351,24 @@ def forget_samples(learning: BiasSamples) -> None:
 
 
 @kernel
-def learn_bias(learning: BiasSamples, block_size: int, bias: Vector3, prior: float) -> None:
+def learn_bias(
+    learning: BiasSamples, constants: InertialConstants, bias: Vector3, prior: float
+) -> None:
     """Count a sample that has been added to ``filling_sum``, and update the bias (3,).
 
     A full block of samples counts only once the block after it is full too, so that samples
     from the beginning of a motion, which is noticed late, are left out. The mean starts from
-    zero with the weight of ``prior`` samples: the usual ratio of the variances of noise and
+    zero with the weight of ``prior`` [s] of samples: the usual ratio of the variances of noise and
     bias.
     """
     learning.filled += 1
     filled = learning.filled
-    if filled < block_size:
+    if filled < constants.block_size:
         return
     if learning.held > 0:
-        learning.samples = min(learning.samples + filled, 1000)
-        bias[:] += (learning.held_sum - filled * bias) / (learning.samples + prior)
+        learning.samples = min(learning.samples + filled, constants.longest_mean)
+        weight = learning.samples + prior / constants.period
+        bias[:] += (learning.held_sum - filled * bias) / weight
     learning.held_sum[:] = learning.filling_sum
     learning.filling_sum[:] = 0.0
     learning.held = filled
@@ -351,17 +385,16 @@ def set_point_positions(estimate: BaseEstimate, legs: LegKinematics) -> None:
 
 
 @kernel
-def use_contacts(
+def correct_motion(
     estimate: BaseEstimate,
     legs: LegKinematics,
-    base: BaseState,
     params: InertialParameters,
     constants: InertialConstants,
     scratch: InertialScratch,
     trusted: float,
     support: float,
 ) -> None:
-    """Correct velocity and position by the points that stand, and publish the base's motion.
+    """Correct velocity and position by the points that stand.
 
     Args:
         trusted: the largest weight of a point.
@@ -370,11 +403,16 @@ def use_contacts(
     airborne = trusted * support < 0.25 or count_standing(legs.points.active) == 0
     estimate.flight_ticks = estimate.flight_ticks + 1 if airborne else 0
     correct_by_contacts(
-        legs.points, support * params.velocity_gain, support * params.position_gain,
-        estimate.position, estimate.velocity,
+        legs.points, support * constants.velocity_gain, support * constants.position_gain,
+        estimate.position, estimate.velocity, scratch.residual,
     )  # fmt: skip
     if params.flight == "ballistic":
         fall_freely(estimate, legs, constants, scratch)
+
+
+@kernel
+def publish(estimate: BaseEstimate, base: BaseState) -> None:
+    """Publish the pose and the velocity of the base."""
     base.position[:] = estimate.position
     base.linear_velocity[:] = estimate.velocity
     base.angular_velocity[:] = estimate.angular_velocity
@@ -398,7 +436,7 @@ def fall_freely(
     change[:] = velocity - estimate.ballistic_velocity
     if ticks <= max(round(0.02 / constants.period), 1):
         estimate.ballistic_velocity[:] += change / ticks
-    elif largest_of(change) < _IMPACT:
+    elif largest_of(change) < _IMPACT * constants.period:
         estimate.velocity[:] -= change
     else:
         estimate.flight_ticks = 0  # keep the velocity by the IMU

@@ -8,9 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Array1D
+from ...mathematics.arrays import Array, Array1D, Vector3
 from ...mathematics.constants import GRAVITY
+from ...mathematics.elementary import atan2
 from ...mathematics.inertial_filter import (
+    STARTING_RATE,
     misalignment,
     orientation_from_gravity,
     propagate,
@@ -57,6 +59,10 @@ _START_TURN = 0.05
 _START_SPEED = 0.01
 _START_PLACE = 0.02
 """Standard deviations at the start [rad, m/s, m], before the feet have been used."""
+_STEP_TURN = 0.05
+_STEP_SPEED = 1.0
+_STEP_PLACE = 1e-3
+"""The same at a start in a step, of tilt and velocity; the last also of the heading [rad]."""
 
 
 class TrackedContacts(NamedTuple):
@@ -120,8 +126,8 @@ class InvariantKalmanFilter(Block):
     should, and other measurements get more weight. A rate that is saturated in flight is not known
     at all; ``health`` reports that.
 
-    It starts at the first sample, with the robot standing on level ground: the world's origin is
-    midway between the soles and x is the heading of the feet. Yaw and horizontal position drift
+    It starts at the first sample, with the robot standing on level ground, or in a step as ``StateEstimator``: the
+    world's origin is midway between the soles and x is the heading of the feet. Yaw and horizontal position drift
     from jump to jump. The block never waits and raises no errors in a run.
     """
 
@@ -213,7 +219,8 @@ class InvariantKalmanFilter(Block):
         differentiate_contacts(legs.bodies, legs.tracked, scratch.centres, scratch.centre_jacobians)
         to_matrix(estimate.orientation, scratch.rotation)
         if not estimate.started:
-            start(estimate, legs.motion, params, constants, scratch)
+            stands = is_standing(joints, contacts, estimate.angular_velocity)
+            start(estimate, legs.motion, contacts, stands, params, constants, scratch)
         use_contacts(contacts, estimate, params, constants, scratch, health, period)
         if params.level_ground or not estimate.flown:
             use_ground(estimate, params, constants, scratch, health, period)
@@ -291,44 +298,74 @@ def predict(
 
 
 @kernel
+def is_standing(joints: JointState, contacts: ContactState, rate: Vector3) -> bool:
+    """Check whether the robot stands on all points, though not all report it: it is at rest, or hangs in a gantry."""
+    standing = 0
+    for point in range(contacts.active.shape[0]):
+        standing += bool(contacts.active[point])
+    fastest = 0.0
+    for i in range(joints.velocity.shape[0]):
+        fastest = max(fastest, abs(joints.velocity[i]))
+    for k in range(3):
+        fastest = max(fastest, abs(rate[k]))
+    return standing == 0 or standing == contacts.active.shape[0] or fastest < STARTING_RATE
+
+
+@kernel
 def start(
     estimate: InvariantEstimate,
     motion: ContactMotion,
+    contacts: ContactState,
+    stands: bool,
     params: InvariantFilterParameters,
     constants: InvariantConstants,
     scratch: InvariantScratch,
 ) -> None:
-    """Start with the robot standing on level ground at the origin, its feet heading along x."""
+    """Start at the origin, the feet heading along x: standing on level ground, or in a step."""
     error, place, vector = scratch.residual, estimate.vectors[1], scratch.vector
+    scratch.believed[:] = True
+    if not stands:
+        scratch.believed[:] = contacts.active
     for _ in range(20):
-        misalignment(
-            estimate.orientation, motion.points, motion.forward, constants.gradient, error, vector
-        )
+        flat = misalignment(
+            estimate.orientation, motion.points, scratch.believed, motion.forward,
+            constants.gradient, error, vector,
+        )  # fmt: skip
+        if not flat:
+            rotate(estimate.orientation, motion.forward, vector)
+            error[2] = -atan2(vector[1], vector[0])
         error[:] = min(max(error, -0.2), 0.2)
         rotate_in_world(estimate.orientation, error[0], error[1], error[2])
     to_matrix(estimate.orientation, scratch.rotation)
-    soles, count = motion.soles.shape[0], constants.foot.shape[0]
+    soles, standing = motion.soles.shape[0], 0
     for sole in range(soles):
         rotate(estimate.orientation, motion.soles[sole], vector)
         place[:2] -= vector[:2] / soles
-    for point in range(count):
-        rotate(estimate.orientation, scratch.centres[point], vector)
-        place[2] += (constants.height[point] - vector[2]) / count
-    start_covariance(estimate, params)
+    for point in range(constants.foot.shape[0]):
+        standing += bool(scratch.believed[point])
+    for point in range(constants.foot.shape[0]):
+        if scratch.believed[point]:
+            rotate(estimate.orientation, scratch.centres[point], vector)
+            place[2] += (constants.height[point] - vector[2]) / standing
+    start_covariance(estimate, params, stands)
     estimate.started = True
-    scratch.believed[:] = True
     add_contacts(estimate, constants, scratch)
-    define_world(estimate, params, constants, scratch)
+    if stands:
+        define_world(estimate, params, constants, scratch)
 
 
 @kernel
-def start_covariance(estimate: InvariantEstimate, params: InvariantFilterParameters) -> None:
+def start_covariance(
+    estimate: InvariantEstimate, params: InvariantFilterParameters, stands: bool
+) -> None:
     """Set the variances before the feet have been used; no contact point is in the state."""
     bias = 9 + 3 * estimate.present.shape[0]
     for k in range(estimate.covariance.shape[0]):
         deviation = params.encoder_offset
         if k < 9:
             deviation = _START_TURN if k < 3 else (_START_SPEED if k < 6 else _START_PLACE)
+            if not stands:  # heading and place are defined by the start, the rest is hardly known
+                deviation = _STEP_TURN if k < 2 else (_STEP_SPEED if 3 <= k < 6 else _STEP_PLACE)
         elif k < bias:
             deviation = 0.0
         elif k < bias + 6:

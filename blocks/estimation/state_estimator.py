@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 from ...mathematics.constants import GRAVITY
 from ...mathematics.inertial_filter import (
     correct_tilt_from_gravity,
@@ -23,6 +26,7 @@ from .inertial_estimator import (
     InertialParameters,
     InertialScratch,
     LegKinematics,
+    correct_motion,
     count_standing,
     forget,
     forget_samples,
@@ -30,9 +34,25 @@ from .inertial_estimator import (
     learn_bias,
     limit,
     predict,
+    publish,
     set_point_positions,
-    use_contacts,
 )
+
+_SHORTEST_LINE = 0.06
+_LONGEST_LINE = 2.0
+"""Times [s] over which lines are fitted to the angles by the ground: at first, and at most."""
+_LINE_NOISE = 6e-8
+"""Squared uncertainty of a line's slope times its duration cubed [rad^2 s]: 0.5 mrad of white noise in 20 ms."""
+_GROUND_TIME = 1.0
+"""Time constant of the correction by the ground [s] after a step, when feet may roll."""
+_FIRST_TILT_TIME = 0.2
+"""Time constant of the tilt correction by velocity [s] at a start in a step, when the tilt is hardly known."""
+_UNREST_TIME = 0.3
+_FIRST_UNREST = 0.1
+_LARGEST_UNREST = 0.3
+"""The low-pass of the standing points' speed [s], and that speed [m/s] at a start in a step, and at most."""
+_REST_TIME = 2.0
+"""Time constant [s] with which the gyroscope's bias is learnt at rest after a step."""
 
 
 class GroundTrust(Signal):
@@ -44,6 +64,9 @@ class GroundTrust(Signal):
     facing = Field(dtype="bool", text="the feet's heading has been noted")
     heading = Field(unit="rad", frame="world", text="direction of the feet while they stand")
     aligned = Field(dtype="int64", text="ticks of alignment with the level ground")
+    stepped = Field(dtype="bool", text="a point has been without contact since the start")
+    unrest = Field(unit="m/s", text="speed at which the stillest point seems to move, low-passed")
+    age = Field(unit="s", text="time since the start in a step; infinite if the robot stood there")
 
 
 class StateEstimatorParameters(InertialParameters):
@@ -51,6 +74,11 @@ class StateEstimatorParameters(InertialParameters):
 
     gate: float = live_parameter(
         0.08, unit="m/s", gt=0.0, text="speed at which a point is trusted by a quarter"
+    )
+    unrest_factor: float = live_parameter(
+        6.0,
+        ge=0.0,
+        text="the gate is at least this many times the speed of points that should stand",
     )
     gate_growth: float = live_parameter(
         2.0, unit="m/s^2", ge=0.0, text="growth rate of the gate while all points are rejected"
@@ -63,6 +91,15 @@ class StateEstimatorParameters(InertialParameters):
     )
     slow_rate: float = live_parameter(
         1.5, unit="rad/s", gt=0.0, text="rate of base and joints below which feet are flat"
+    )
+    tilt_time: float = live_parameter(
+        1.0, unit="s", gt=0.0, text="time constant of the tilt correction by velocity, after a step"
+    )
+    bias_spread: float = live_parameter(
+        0.01,
+        unit="rad/s",
+        gt=0.0,
+        text="standard deviation of the gyroscope's bias, before it is learnt",
     )
 
 
@@ -77,9 +114,10 @@ class StateEstimator(InertialEstimator):
 
     **Correction by the legs.** Let r_i(q) be a contact point relative to the base. If the point is
     at rest in the world at a_i, then v = -R (J_i q' + w x r_i) and p = a_i - R r_i. The estimate is
-    corrected towards both with the gains ``velocity_gain`` and ``position_gain`` per tick, so the
-    legs' noise is averaged over 1/gain ticks; there is no lag, because the IMU predicts the motion
-    meanwhile. a_i is set when the point touches down.
+    corrected towards both with the gains ``velocity_gain`` and ``position_gain`` per second, so the
+    legs' noise is averaged over 1/gain; there is no lag, because the IMU predicts the motion
+    meanwhile. a_i is set when the point touches down, and again while its weight is below 1/4. All gains and times
+    are per second, so the estimate does not depend on the rate of the ticks.
 
     **Differences from the paper's filter** (``ComplementaryFilter``), which matter for jumps:
 
@@ -87,12 +125,17 @@ class StateEstimator(InertialEstimator):
       velocity, and no point counts while the IMU measures no support. So slipping feet, heels that
       lift and contacts that a latch still holds after lift-off do not disturb the velocity at
       lift-off. ``gate`` grows while all points are rejected or in the air, so that the estimate
-      recovers from a wrong prediction.
+      recovers from a wrong prediction. Feet of real legs roll and yield: the stillest point of a stance moves by
+      50 mm/s and more, where a simulator's stands still. So the gate is at least ``unrest_factor`` times the speed at
+      which the stillest points have seemed to move lately.
     * While all points are in contact and the robot moves slowly, before the first flight, the feet are flat on level ground.
       Or it leans by ``slope``. Then the heights of the points give the tilt, as exactly as the encoder offsets allow (about
       3 mrad, where a biased accelerometer has 10 mrad), and the feet give the heading while they
-      stand. The drift of both, by a least-squares line over up to 250 ticks, gives the gyroscope's
-      bias. While the robot stands still before the first flight, the accelerometer's reading minus
+      stand. Until the first step the drift of both, by a least-squares line over up to 2 s, gives the gyroscope's
+      bias, weighed against ``bias_spread`` and never beyond three times of it: what a short time tells is not believed. After a step the ground corrects the
+      tilt with a time constant of 1 s only, the heading is that of the new stance, and the bias is learnt at rest.
+    * After the first step the velocity by the legs corrects the tilt, in single support, too: a tilt error e is a false
+      acceleration g x e, which the residual of the velocity shows. Its time constant is ``tilt_time``. While the robot stands still before the first flight, the accelerometer's reading minus
       gravity gives its bias, which would cause a drift in flight. After a flight the feet may stand at
       different heights, so only the accelerometer corrects the tilt, unless all ground is
       level by ``level_ground``.
@@ -102,7 +145,9 @@ class StateEstimator(InertialEstimator):
     then on the CoM falls freely, and the base follows from the joints. That does not drift, but it
     also does not notice a push.
 
-    It starts at the first sample, or in a gantry when the first point touches the ground, with the robot standing on level ground, or ground of that ``slope``: the world's
+    It starts at the first sample, or in a gantry when the first point touches the ground, with the robot standing on level ground, or ground of that ``slope``; or in a step,
+    if points are without contact and a rate is above 0.5 rad/s: then only the points in contact are on the ground, they give the first velocity, the tilt is
+    theirs, or the accelerometer's where they lie in one line, and the result has a warning. The world's
     origin is midway between the soles, and x is the heading of the feet; for feet of one contact point it is
     the heading of the pattern in which they stand. Yaw and horizontal position drift. After a jump
     the height of the ground is known only through the anchors. The block never waits and raises no
@@ -135,23 +180,64 @@ class StateEstimator(InertialEstimator):
         fastest = predict(imu, joints, estimate, legs, constants, scratch)
         if airborne and trust.aligned > 0:
             trust.flown = True
-            trust.facing = False
         if trust.gate == 0.0:  # the first tick: the feet point along x
             trust.gate = params.gate
             trust.facing = True
+            trust.stepped = not estimate.stood
+            trust.unrest = _FIRST_UNREST if trust.stepped else 0.0
+            trust.age = 0.0 if trust.stepped else math.inf
+        elif fastest == math.inf:  # a foot that steps points elsewhere afterwards
+            trust.facing = False
+            trust.stepped = True
+        trust.age += constants.period
         still = fastest < params.still_rate
         if not trust.flown:
             learn_accelerometer_bias(estimate, learning, constants, scratch, still)
         if is_unaccelerated(scratch.force):
             if fastest < params.slow_rate and (params.level_ground or not trust.flown):
-                align_with_ground(estimate, trust, legs, constants, scratch)
+                align_with_ground(estimate, trust, legs, params, constants, scratch)
             elif still:
                 correct_tilt_from_gravity(
-                    estimate.orientation, scratch.force, params.tilt_gain, scratch.vector
+                    estimate.orientation, scratch.force, constants.tilt_gain, scratch.vector
                 )
         set_point_positions(estimate, legs)
         trusted, support = trust_points(estimate, trust, legs, params, constants, scratch)
-        use_contacts(estimate, legs, base, params, constants, scratch, trusted, support)
+        correct_motion(estimate, legs, params, constants, scratch, trusted, support)
+        if trust.stepped:
+            correct_tilt_by_velocity(estimate, trust, params, constants, scratch, support)
+            if still:
+                share = constants.period / _REST_TIME
+                estimate.gyro_bias[:] += share * (estimate.mean_rate - estimate.gyro_bias)
+                limit(estimate.gyro_bias, 3.0 * params.bias_spread, estimate.gyro_bias)
+        publish(estimate, base)
+
+    def warnings(self) -> Sequence[str]:
+        """Say when the estimate began in a step."""
+        if not self.estimate.started or self.estimate.stood:
+            return ()
+        return (
+            (
+                "the estimate began while the robot was stepping: its tilt is known to some degrees for the first "
+                "second, and the gyroscope's bias is learnt only at rest"
+            ),
+        )
+
+
+@kernel
+def correct_tilt_by_velocity(
+    estimate: BaseEstimate,
+    trust: GroundTrust,
+    params: StateEstimatorParameters,
+    constants: InertialConstants,
+    scratch: InertialScratch,
+    support: float,
+) -> None:
+    """Correct the tilt by what the standing points say of the velocity: a tilt error is a false acceleration."""
+    residual = scratch.residual
+    limit(residual, 0.3, residual)
+    time = min(max(trust.age, _FIRST_TILT_TIME), params.tilt_time)
+    gain = support * constants.velocity_gain / (GRAVITY * time)
+    rotate_in_world(estimate.orientation, -gain * residual[1], gain * residual[0], 0.0)
 
 
 @kernel
@@ -170,7 +256,7 @@ def learn_accelerometer_bias(
     gravity[0], gravity[1], gravity[2] = 0.0, 0.0, GRAVITY
     rotate_back(estimate.orientation, gravity, gravity)
     learning.filling_sum[:] = learning.filling_sum + scratch.force + bias - gravity
-    learn_bias(learning, constants.block_size, bias, 3.0)
+    learn_bias(learning, constants, bias, 0.006)
 
 
 @kernel
@@ -178,18 +264,25 @@ def align_with_ground(
     estimate: BaseEstimate,
     trust: GroundTrust,
     legs: LegKinematics,
+    params: StateEstimatorParameters,
     constants: InertialConstants,
     scratch: InertialScratch,
 ) -> None:
     """Correct tilt and heading by the points, and the gyroscope's bias by the drift of both."""
     motion, error, drift = legs.motion, scratch.error, scratch.vector
-    # Least squares over all ticks so far, then over the last 250: angle and its drift.
-    trust.aligned = min(trust.aligned + 1, 250)
-    n = max(trust.aligned, 30)
+    # A line by least squares, over all ticks so far or over the longest time: angle and its drift.
+    trust.aligned += 1
+    time = min(max(trust.aligned * constants.period, _SHORTEST_LINE), _LONGEST_LINE)
+    n = time / constants.period
     angle_gain, drift_gain = 2 * (2 * n - 1) / (n * (n + 1)), 6 / (n * (n + 1))
+    variance = params.bias_spread * params.bias_spread
+    drift_gain *= variance / (variance + _LINE_NOISE / (time * time * time))
+    if trust.stepped:
+        angle_gain, drift_gain = min(constants.period / _GROUND_TIME, 1.0), 0.0
     misalignment(
-        estimate.orientation, motion.points, motion.forward, constants.gradient, error, drift
-    )
+        estimate.orientation, motion.points, legs.points.active, motion.forward, constants.gradient,
+        error, drift,
+    )  # fmt: skip
     if not trust.facing:
         trust.heading = -error[2]
         trust.facing = True
@@ -197,6 +290,7 @@ def align_with_ground(
     limit(error, 0.05, error)
     rotate_back(estimate.orientation, error, drift)
     estimate.gyro_bias[:] -= drift * (drift_gain / constants.period)
+    limit(estimate.gyro_bias, 3.0 * params.bias_spread, estimate.gyro_bias)
     error[:] *= angle_gain
     rotate_in_world(estimate.orientation, error[0], error[1], error[2])
 
@@ -224,6 +318,8 @@ def trust_points(
     elif trusted < 0.25:
         gate += growth * constants.period
     else:
-        gate += 0.1 * (params.gate - gate)
+        speed = min(gate * math.sqrt(1.0 / math.sqrt(trusted) - 1.0), _LARGEST_UNREST)
+        trust.unrest += min(constants.period / _UNREST_TIME, 1.0) * (speed - trust.unrest)
+        gate += constants.relaxing * (max(params.gate, params.unrest_factor * trust.unrest) - gate)
     trust.gate = min(gate, 10.0)
     return trusted, support

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
-from ..importing.build import LIGHTEST
-from ..importing.build import SPLIT as SPLIT_SHARE
+from ..importing.build import SHARE as LIGHT_SHARE
+from ..importing.build import split_share
 from ..importing.inertials import mujoco_remarks
 from ..importing.raw_model import Reference
 from .differences import SAME, Differences, tensor, together
@@ -179,8 +179,8 @@ def _compare_links(ours: FileRobot, state: _State, found: Differences) -> float:
     for body in ours.model.bodies.values():
         carried = [j for j in built.joints if j["name"] in {each.name for each in body.joints}]
         for joint in carried[:-1]:
-            light = SPLIT_SHARE * body.inertial.mass <= LIGHTEST
-            share = LENT if light else max(share, SPLIT)
+            lent = LENT if split_share(body.inertial) == LIGHT_SHARE else SPLIT
+            share = max(share, lent)
             pieces.add(joint["child"])
             join(joint["child"], carried[-1]["child"])
     if pieces:

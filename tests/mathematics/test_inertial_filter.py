@@ -104,7 +104,9 @@ def test_misalignment_puts_the_feet_on_the_ground_and_faces_forward(x, y, z, gra
     q, error = true.copy(), np.empty(3)
     inertial.rotate_in_world(q, x, y, z)
     for _ in range(10):
-        assert inertial.misalignment(q, points, forward, np.array(gradient), error, np.empty(3))
+        assert inertial.misalignment(
+            q, points, np.ones(4, bool), forward, np.array(gradient), error, np.empty(3)
+        )
         inertial.rotate_in_world(q, *error.tolist())
     assert np.abs(turn_between(q, true)).max() < 1e-9
 
@@ -113,7 +115,8 @@ def test_misalignment_is_first_order_exact():
     """One step takes a small error away up to its square."""
     points = np.array([[0.05, -0.08, -0.4], [-0.03, -0.08, -0.4], [0.05, 0.08, -0.4]])
     q, error = quaternion_of((1e-3, -2e-3, 3e-3)), np.empty(3)
-    inertial.misalignment(q, points, np.array([1.0, 0, 0]), np.zeros(2), error, np.empty(3))
+    forward = np.array([1.0, 0, 0])
+    inertial.misalignment(q, points, np.ones(3, bool), forward, np.zeros(2), error, np.empty(3))
     assert error == pytest.approx([-1e-3, 2e-3, -3e-3], abs=1e-5)
 
 
@@ -122,7 +125,13 @@ def test_points_in_one_line_say_nothing():
     error = np.ones(3)
     forward = np.array([1.0, 0, 0])
     assert not inertial.misalignment(
-        quaternion_of((0.1, 0, 0)), points, forward, np.zeros(2), error, np.empty(3)
+        quaternion_of((0.1, 0, 0)),
+        points,
+        np.ones(3, bool),
+        forward,
+        np.zeros(2),
+        error,
+        np.empty(3),
     )
     assert not error.any()
 
@@ -141,7 +150,7 @@ def test_weights_fall_with_speed_and_are_zero_without_contact():
 def stand(position, velocity, points, rates, weights, anchors, anchored, gain=0.1):
     active = np.ones(len(points), dtype=bool)
     standing = inertial.StandingPoints(points, rates, active, weights, anchors, anchored)
-    inertial.correct_by_contacts(standing, gain, gain, position, velocity)
+    inertial.correct_by_contacts(standing, gain, gain, position, velocity, np.empty(3))
 
 
 def test_standing_points_pull_velocity_and_position():
@@ -166,11 +175,20 @@ def test_an_untrusted_point_drags_its_anchor_and_pulls_nothing():
     assert anchors == pytest.approx(points)
 
 
+def test_a_point_that_is_half_trusted_keeps_its_anchor_at_any_rate():
+    position, anchors = np.array([0.05, 0.0, 0.0]), np.array([[0.0, 0.1, -0.4]])
+    points, anchored, place = anchors.copy(), np.array([True]), anchors.copy()
+    for _ in range(1000):
+        stand(position, np.zeros(3), points, np.zeros((1, 3)), np.array([0.5]), anchors, anchored)
+    assert (anchors == place).all(), "it does not follow a wrong position"
+    assert np.abs(position).max() < 1e-6
+
+
 def test_a_point_without_contact_loses_its_anchor():
     anchored = np.array([True, True])
     standing = inertial.StandingPoints(
         np.zeros((2, 3)), np.zeros((2, 3)), np.array([True, False]), np.array([1.0, 0.0]),
         np.zeros((2, 3)), anchored,
     )  # fmt: skip
-    inertial.correct_by_contacts(standing, 0.1, 0.1, np.zeros(3), np.zeros(3))
+    inertial.correct_by_contacts(standing, 0.1, 0.1, np.zeros(3), np.zeros(3), np.empty(3))
     assert anchored.tolist() == [True, False]

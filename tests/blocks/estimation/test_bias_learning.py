@@ -3,9 +3,20 @@
 import numpy as np
 import pytest
 
-from aloft.blocks.estimation.inertial_estimator import BiasSamples, forget_samples, learn_bias
+from aloft.blocks.estimation.inertial_estimator import (
+    BiasSamples,
+    InertialConstants,
+    forget_samples,
+    learn_bias,
+)
 
-BLOCK, PRIOR = 10, 5.0
+BLOCK, PRIOR, PERIOD = 10, 5.0, 0.002
+
+
+def constants() -> InertialConstants:
+    values = InertialConstants.allocate()
+    values.block_size, values.longest_mean, values.period = BLOCK, 1000, PERIOD
+    return values
 
 
 def nothing() -> tuple[BiasSamples, np.ndarray]:
@@ -15,7 +26,7 @@ def nothing() -> tuple[BiasSamples, np.ndarray]:
 def feed(learning: BiasSamples, bias: np.ndarray, samples: np.ndarray) -> None:
     for sample in samples:
         learning.filling_sum[:] += sample
-        learn_bias(learning, BLOCK, bias, PRIOR)
+        learn_bias(learning, constants(), bias, PRIOR * PERIOD)
 
 
 def test_the_bias_is_the_mean_of_all_blocks_but_the_last_with_the_prior() -> None:

@@ -63,7 +63,7 @@ def test_it_learns_the_bias_of_the_gyroscope_while_still_and_of_nothing_else():
 def test_the_legs_move_the_base():
     """A squat at constant speed, with an IMU that reads a fall too slow to be a flight."""
     bench = BlockBench(
-        ComplementaryFilter, {"velocity_gain": 0.2, "position_gain": 0.2}, robot="bruce"
+        ComplementaryFilter, {"velocity_gain": 112.0, "position_gain": 112.0}, robot="bruce"
     )
     stand(bench, 100)
     for tick in range(250):

@@ -1,0 +1,139 @@
+"""Estimators whose gains are per second, that begin in a step, and that learn nothing from a few ticks."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from aloft.blocks.estimation.complementary_filter import ComplementaryFilter
+from aloft.blocks.estimation.invariant_kalman_filter import InvariantKalmanFilter
+from aloft.blocks.estimation.state_estimator import StateEstimator
+from aloft.mathematics.constants import GRAVITY
+from aloft.robots.description import find_robot
+from aloft.runtime.testing import BlockBench
+
+from ...turns import quaternion_of, turn_between
+
+ROBOT = find_robot("bruce")
+FOOT = np.asarray(ROBOT.foot_of_contact())
+RATES = [100.0, 250.0, 500.0, 1000.0, 2000.0]
+
+
+def standing(kind, rate=500.0, active=True, **params):
+    bench = BlockBench(kind, params, robot="bruce", rate=rate)
+    bench.set("joints", position=ROBOT.standing_position)
+    bench.set("imu", specific_force=[0.0, 0.0, GRAVITY])
+    bench.set("contacts", active=active)
+    bench.step()
+    return bench
+
+
+def tilt_of(bench):
+    return float(
+        np.abs(turn_between(bench.get("base").orientation, quaternion_of(np.zeros(3)))).max()
+    )
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("kind", [StateEstimator, ComplementaryFilter])
+def test_a_wrong_velocity_fades_in_the_same_time_at_any_rate(kind, rate):
+    bench = standing(kind, rate)
+    bench.set("estimate", velocity=[0.02, 0.0, 0.0])
+    bench.step(round(0.1 * rate))
+    assert bench.get("base").linear_velocity[0] == pytest.approx(0.02 * math.exp(-1.5), rel=0.1)
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_the_velocity_corrects_the_tilt_on_one_foot_at_any_rate(rate):
+    """The accelerometer is not asked, for a robot on one foot may be accelerated."""
+    bench = standing(StateEstimator, rate)
+    bench.set("contacts", active=FOOT == 0)
+    bench.step()
+    start = quaternion_of(np.array([0.03, -0.02, 0.0]))
+    bench.set("estimate", orientation=start)
+    before = tilt_of_estimate(start)
+    bench.step(round(1.0 * rate))
+    assert 0.2 * before < tilt_of(bench) < 0.6 * before
+    bench.step(round(4.0 * rate))
+    assert tilt_of(bench) < 0.05 * before
+
+
+def tilt_of_estimate(orientation):
+    return float(np.abs(turn_between(orientation, quaternion_of(np.zeros(3)))).max())
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_no_bias_is_believed_after_a_few_ticks(rate):
+    """A log of a walk had 26 ms of double support, from which 2.1 rad/s were learnt."""
+    bench = standing(StateEstimator, rate)
+    bench.set("imu", angular_velocity=[0.6, -0.4, 1.0])
+    bench.step(max(round(0.026 * rate), 1))
+    bench.set("contacts", active=FOOT == 0)
+    bench.set("imu", angular_velocity=[0.0, 0.0, 0.0])
+    bench.step(round(0.5 * rate))
+    assert np.abs(bench.get("estimate").gyro_bias).max() < 0.031
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_a_bias_is_learnt_from_a_second_of_standing(rate):
+    bench = standing(StateEstimator, rate)
+    bench.set("imu", angular_velocity=[0.01, -0.008, 0.006])
+    bench.step(round(2.0 * rate))
+    assert bench.get("estimate").gyro_bias == pytest.approx([0.01, -0.008, 0.006], abs=1e-3)
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_after_a_step_the_heading_is_that_of_the_new_stance(rate):
+    """A walk in a curve is not pulled back to the heading of the first stance."""
+    bench = standing(StateEstimator, rate)
+    bench.step(round(0.5 * rate))
+    bench.set("contacts", active=FOOT == 0)
+    bench.set("imu", angular_velocity=[0.0, 0.0, 0.5])
+    bench.step(round(0.4 * rate))
+    bench.set("contacts", active=True)
+    bench.set("imu", angular_velocity=[0.0, 0.0, 0.0])
+    bench.step(round(3.0 * rate))
+    assert turn_between(
+        bench.get("base").orientation, quaternion_of(np.array([0.0, 0.0, 0.2]))
+    ) == pytest.approx(np.zeros(3), abs=0.01)
+
+
+@pytest.mark.parametrize("kind", [StateEstimator, ComplementaryFilter, InvariantKalmanFilter])
+def test_a_log_may_begin_in_a_step(kind):
+    """One foot is in the air, half a foot above the ground: the tilt is not taken from it."""
+    bench = BlockBench(kind, robot="bruce")
+    joints = np.array(ROBOT.standing_position)
+    knee = [k for k, joint in enumerate(ROBOT.joints) if "left_knee" in joint.name]
+    joints[knee] -= 0.6
+    speed = np.zeros(len(joints))
+    speed[knee] = 2.0
+    bench.set("joints", position=joints, velocity=speed)
+    bench.set("imu", specific_force=[0.0, 0.0, GRAVITY])
+    right = np.array([ROBOT.feet[foot].name.startswith("right") for foot in FOOT])
+    bench.set("contacts", active=right)
+    bench.step()
+    assert tilt_of(bench) < 0.02
+    lowest = bench.get("base").position[2]
+    assert lowest == pytest.approx(0.38, abs=0.01), "the foot that stands is on the ground"
+
+
+def test_a_start_in_a_step_is_told_and_a_start_at_rest_is_not():
+    bench = BlockBench(StateEstimator, robot="bruce")
+    bench.set("joints", position=ROBOT.standing_position, velocity=1.0)
+    bench.set("imu", specific_force=[0.0, 0.0, GRAVITY])
+    bench.set("contacts", active=FOOT == 0)
+    assert not bench.block.warnings()
+    bench.step()
+    assert "began while the robot was stepping" in bench.block.warnings()[0]
+    assert not standing(StateEstimator).block.warnings()
+
+
+def test_feet_that_roll_open_the_gate_and_feet_that_stand_do_not():
+    bench = standing(StateEstimator)
+    bench.step(500)
+    assert bench.get("trust").gate == pytest.approx(0.08, rel=0.01)
+    bench.set("joints", velocity=[0.2 * (-1) ** k for k in range(len(ROBOT.joints))])
+    bench.step(500)
+    assert bench.get("trust").gate > 0.1
