@@ -94,7 +94,7 @@ class BearRobot(DrivenRobot):
                 f"in virtual time nothing guards the drives at {hardware.bus.port}: only a twin may be "
                 "armed so",
                 parameter="time",
-                expected="real, or the file that `aloft twin --virtual --write` writes",
+                expected="real, or the file that `aloft twin --virtual --out` writes",
                 found="virtual",
             )
         ratio = context.period / hardware.bus.period

@@ -228,7 +228,7 @@ def write_overlay(path: Path, graph: CheckedGraph, rows: Sequence[Mapping[str, A
         text = _text(included, found)
         checked_text(text, path)
         if path.exists() and not path.read_text(encoding="utf-8").startswith(FIRST_LINE):
-            raise AloftError(f"{path} is there already; give another name with --save FILE")
+            raise AloftError(f"{path} is there already; give another name with --out FILE")
         path.write_text(text, encoding="utf-8")
     except LoadError as error:
         raise AloftError(f"the file would not load: {error}") from error

@@ -9,12 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 
 import aloft
 import aloft.lab.benchmarks.catalogue
 import aloft.runtime.loading
-from aloft.cli.app import all_verbs
+from aloft.cli.app import all_verbs, make_app
 from aloft.cli.verbs import PANELS, help_page
+from aloft.logs.file.code import code_of, remember
+from aloft.runtime.loading import flatten
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]
@@ -184,10 +187,13 @@ def complete(start: Start, words: str) -> list[str]:
 
 
 @pytest.mark.long
-def test_the_tab_key_completes(folder: Path, start: Start) -> None:
+def test_the_tab_key_completes(folder: Path, start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     assert complete(start, "aloft ru") == ["run"]
     assert "--seeds" in complete(start, "aloft run --se")
     assert complete(start, "aloft blocks blocks.Ga") == ["blocks.Gain"]
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+    assert complete(start, "aloft run count.yaml --set counter.s") == [], "its module never ran"
+    remember(code_of(flatten(folder / "count.yaml")))
     assert complete(start, "aloft run count.yaml --set counter.s") == [
         "counter.seed=",
         "counter.stop_at=",
@@ -216,6 +222,22 @@ def test_the_list_of_verbs_imports_no_verb_and_cuts_no_summary(start: Start) -> 
         assert re.search(rf"^  {verb} +[A-Z].*\.$", text, re.MULTILINE), verb
     assert re.findall(r"^(\w+):$", text, re.MULTILINE)[: len(PANELS)] == list(PANELS)
     assert "Other:" not in text
+
+
+def options_of(command: Any, path: str = "aloft") -> list[tuple[str, str]]:
+    """Every option of a command and of those in it: the command's path and its option."""
+    inner = getattr(command, "commands", {})
+    own = [(path, option) for each in command.params for option in each.opts]
+    return [*own, *(row for name in inner for row in options_of(inner[name], f"{path} {name}"))]
+
+
+def test_an_option_has_one_meaning() -> None:
+    rows = options_of(typer.main.get_command(make_app()))
+    times = {path for path, option in rows if option in ("--from", "--to")}
+    assert times == {"aloft plot", "aloft render"}
+    assert not {option for _, option in rows} & {"--save", "--write"}
+    signals = {path for path, option in rows if option == "--output"}
+    assert signals == {"aloft linearise", "aloft export c", "aloft export fmu"}
 
 
 @pytest.mark.parametrize("verb", ["run", "plot", "replay", "robot", "log"])

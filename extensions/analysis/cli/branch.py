@@ -34,7 +34,7 @@ def branch(
         float | None, typer.Option(help="When it ends [s]; by default as the graph says.")
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Both runs side by side, a .rrd file.")
+        Path | None, typer.Option("--out", "-o", help="Both runs side by side, a .rrd file.")
     ] = None,
     folder: GraphFolder = None,
     trust: Trust = False,
