@@ -28,6 +28,7 @@ from ...language.parameters import Parameters
 from ...language.quantities import quantity_of
 from ...language.selection import Selection, runs, select
 from ...language.signals import Field, Signal
+from ..flattening.written_wires import is_name
 from .block_check import BlockDraft
 from .inserted import GatherPiece, gather_block_type, read_values, selected_signal
 from .wire_check import WireCheck
@@ -131,6 +132,15 @@ class _WireComposer:
                     found=name,
                     nearest=similar,
                     fix=f"{similar[0]}: {text_of(plain_slice(wire_slice))}" if similar else "",
+                )
+                return None
+            literal = wire_slice.items[0].literal if wire_slice.items else None
+            if literal is not None and is_name(literal) and fields[name].values is None:
+                self._report(
+                    f"{self.at}: {name} cannot be {text_of(plain_slice(wire_slice))}",
+                    literal.where,
+                    expected="a source, block.port.field, or a number",
+                    found=text_of(plain_slice(wire_slice)),
                 )
                 return None
             found[name] = wire_slice
