@@ -35,6 +35,11 @@ def check(
         raise typer.BadParameter("a graph file is needed, or --schema")
     with errors_reported(as_json):
         checked = checked_file(graph, overrides or [])
+        from ..runtime.running.block_mistakes import mistakes_of
+        from ..runtime.running.kernel_checks import KernelMistake
+
+        if mistakes := mistakes_of(checked):
+            raise KernelMistake("\n".join(mistakes.values()), block=next(iter(mistakes)))
     warnings: list[str] = []
     if checked.machines:
         from ..runtime.transports.registry import open_endpoints

@@ -360,7 +360,9 @@ class Page(NamedTuple):
 STUDIES = "aloft study graphs/studies/"
 PAGES = {
     "agreement": Page(write_agreement, "aloft bench agreement --json > FILE", "FILE"),
-    "comparisons": Page(write_comparisons, f"{STUDIES}controller.yaml", "results/controller ..."),
+    "comparisons": Page(
+        write_comparisons, f"{STUDIES}formulations.yaml", "results/formulations ..."
+    ),
     "effects": Page(write_effects, f"{STUDIES}effects.yaml", "results/effects/summary.json"),
     "every_robot": Page(write_every_robot, "aloft bench every_robot --json > FILE", "FILE"),
     "mutated_robots": Page(

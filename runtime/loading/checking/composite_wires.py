@@ -180,8 +180,8 @@ class _WireComposer:
                 filled = self._constant_field(name, field, item)
                 if filled is None:
                     return
-                values, shape = filled
-                self.pieces.append(GatherPiece(name, numbers=values))
+                numbers, shape = filled
+                self.pieces.append(GatherPiece(name, numbers=numbers))
                 self.fields[name] = (shape, field.dtype_name)
                 return
             if item.literal is not None:
