@@ -36,6 +36,10 @@ def check(
         from ..runtime.transports.registry import open_endpoints
 
         warnings = open_endpoints(checked.machines)
+    if sum(spec.block_type.__name__ == "Integrator" for spec in checked.blocks) > 1:
+        from ..runtime.loading.euler_rings import growing_rings
+
+        warnings += growing_rings(checked)
     if as_json:
         found = {"file": str(graph), "ok": True, "count": 0, "problems": [], "warnings": warnings}
         print_json({"success": True, **found, "unchecked": list(checked.unchecked)})
