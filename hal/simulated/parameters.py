@@ -236,6 +236,11 @@ class SimulatorParameters(DriveGains, WorldParameters):
         text="that of noise, jitter, and the attitude and clock at the start, for another run of the "
         "robot that `seed` draws; none: as `seed`",
     )  # fmt: skip
+    flight_integrator: Literal["implicitfast", "RK4"] = parameter(
+        "implicitfast",
+        text="integration of physics steps that begin without any contact: in one stage, or in the four of Runge and Kutta, "
+        "which conserve momentum",
+    )
     timestep: float = parameter(
         0.0005, unit="s", gt=0, le=0.002, text="physics step; it must divide the control period"
     )

@@ -39,7 +39,7 @@ from .external_forces import ExternalForces
 from .gantry import Gantry
 from .mujoco_model import body_name, build_world, number_of_soles
 from .parameters import SimulatorParameters
-from .physics_step import step_calls
+from .physics_step import flight_step_calls, step_calls
 from .sensors import SimulatedSensors
 from .stance import (
     StartCheck,
@@ -205,6 +205,9 @@ class Plant:
             read_encoders, views.angle, self.sensors.encoder_offset, self._encoder
         )
         self.step1, self.step2 = step_calls(model, data)
+        self._advance: list[Call] = [self.step2]
+        if self._params.flight_integrator == "RK4":
+            self._advance = flight_step_calls(model, data, self.step2)
         if self._params.ground.contact_bias:
             self.step1 = ForeignCall(ContactBias(model, data).begin_step, 0)
         self.forces = ExternalForces(model, data, self._robot)
@@ -328,7 +331,7 @@ class Plant:
             *([self.forces.release_call()] if added else []),
             *([] if push is None else [self.forces.push_call(push)]),
             *added,
-            self.step2, *self._motion_calls, self._record_call, *self.sensors.after_step_calls(),
+            *self._advance, *self._motion_calls, self._record_call, *self.sensors.after_step_calls(),
             *self._model_calls, self.step1, *self._reading_calls,
         ]  # fmt: skip
         return CallSequence([self.forces.release_call(), *(one * steps)])

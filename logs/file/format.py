@@ -12,6 +12,8 @@ output and a field. All but the static ones are on the timelines ``t`` (exact na
 ``graph``            the graph as it ran, after includes, sub-graphs and overrides, as text
 ``rows``             ``aloft:packed``: the bytes of the bus after each of some ticks without a
                      gap, at most half a second of them; see ``row_codec``
+``held/N``           ``aloft:packed``: the same of the large fields of slow blocks, in the ticks in
+                     which these ran; see ``held_fields``
 ``signals/B/P/F``    the curve of a field as ``Scalars``, for the viewer: of those in the plots that
                      it shows first, and of as many ticks as the curve needs; see ``drawing``
 ``keyframes``        ``aloft:bus`` and ``aloft:state`` at tick k: the bytes of both buffers before
@@ -52,12 +54,12 @@ from ...runtime.language.signals import Slot
 
 MOST_OF_BUFFER = 1 << 30
 """Bytes of a bus or a state, at most."""
-FORMAT = 5
+FORMAT = 6
 """The number of this format, the only one that is read."""
 SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
 LIMITS, TIMES, WORLD, GRAPH, DIAGRAM = "limits", "times", "world", "graph", "diagram"
 PLOTS = "plots"
-ROWS = "rows"
+ROWS, HELD = "rows", "held"
 BUS, STATE, NOTE, PACKED = "bus", "state", "note", "packed"
 
 

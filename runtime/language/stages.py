@@ -171,7 +171,8 @@ class CheckedGraph:
 
     def block(self, path: str) -> BlockSpec:
         """Return the block at that path. Raises ``KeyError``."""
-        for spec in self.blocks:
-            if spec.path == path:
-                return spec
-        raise KeyError(path)
+        return self._by_path[path]
+
+    @cached_property
+    def _by_path(self) -> Mapping[str, BlockSpec]:
+        return {spec.path: spec for spec in self.blocks}

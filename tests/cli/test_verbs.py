@@ -16,6 +16,8 @@ import aloft.lab.benchmarks.catalogue
 import aloft.runtime.loading
 from aloft.cli.app import all_verbs, make_app
 from aloft.cli.verbs import PANELS, help_page
+from aloft.logs.file.code import code_of, remember
+from aloft.runtime.loading import flatten
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]
@@ -185,10 +187,13 @@ def complete(start: Start, words: str) -> list[str]:
 
 
 @pytest.mark.long
-def test_the_tab_key_completes(folder: Path, start: Start) -> None:
+def test_the_tab_key_completes(folder: Path, start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     assert complete(start, "aloft ru") == ["run"]
     assert "--seeds" in complete(start, "aloft run --se")
     assert complete(start, "aloft blocks blocks.Ga") == ["blocks.Gain"]
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+    assert complete(start, "aloft run count.yaml --set counter.s") == [], "its module never ran"
+    remember(code_of(flatten(folder / "count.yaml")))
     assert complete(start, "aloft run count.yaml --set counter.s") == [
         "counter.seed=",
         "counter.stop_at=",

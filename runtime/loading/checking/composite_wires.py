@@ -193,6 +193,14 @@ class _WireComposer:
         start = 0
         types: dict[str, WireElement] = {}
         for item in wire_slice.items:
+            if item.literal is not None and not wire_slice.is_list:
+                filled = self._constant_field(name, field, item)
+                if filled is None:
+                    return
+                values, shape = filled
+                self.pieces.append(GatherPiece(name, numbers=values))
+                self.fields[name] = (shape, field.dtype_name)
+                return
             if item.literal is not None:
                 values = self._numbers(name, field, item)
                 if values is None:
@@ -226,6 +234,21 @@ class _WireComposer:
         ):
             shape = wanted if wanted == () and start == 1 else (start,)
         self.fields[name] = (shape, next(iter(types), field.dtype_name))
+
+    def _constant_field(
+        self, name: str, field: Field, item: WireElement
+    ) -> tuple[tuple[float, ...], tuple[int, ...]] | None:
+        """Return the numbers of a field that is a constant beside wired ones, and its shape: one number is
+        that of all elements."""
+        assert item.literal is not None
+        shape = self.reader.shape(field)
+        node = MapNode((Entry(name, item.where, item.literal),), item.where)
+        before = len(self.problems)
+        values = read_values(node, self.signal, self.reader, self.at, self.problems)
+        if len(self.problems) > before or shape is None:
+            return None
+        filled = np.broadcast_to(np.asarray(values[name], np.float64), shape)
+        return tuple(filled.ravel().tolist()), shape
 
     def _numbers(self, name: str, field: Field, item: WireElement) -> tuple[float, ...] | None:
         """Numbers between sources, as those of a constant."""

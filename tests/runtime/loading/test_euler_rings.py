@@ -35,7 +35,7 @@ def test_a_mass_on_a_spring_is_named_with_its_growth_and_a_fix() -> None:
     said = float(re.search(r"grows by ([\d.]+) % a second", text)[1])  # type: ignore[index]
     place = abs(graph.run().signal("place.y.value")[:, 0])
     grown = place[-400:].max() / place[:400].max()  # over 3.2 s
-    assert said == pytest.approx(100.0 * (np.exp(150.0 * 0.002 / 2.0) - 1.0), rel=1e-3)
+    assert said == pytest.approx(100.0 * (np.exp(150.0 * 0.002 / 2.0) - 1.0), rel=2e-3)
     assert np.log(grown) / 3.2 == pytest.approx(np.log(1.0 + said / 100.0), rel=0.05)
 
 
