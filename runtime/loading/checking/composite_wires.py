@@ -25,7 +25,7 @@ from ...language.flat_graph import (
     plain_slice,
 )
 from ...language.parameters import Parameters
-from ...language.quantities import quantity_of
+from ...language.quantities import UNCHECKED, quantity_of
 from ...language.selection import Selection, runs, select
 from ...language.signals import Field, Signal
 from ..flattening.written_wires import is_name
@@ -49,6 +49,8 @@ def resolve_composite_wires(
         excused = list(draft.flat.excused)
         for name, wire in draft.flat.wires.items():
             port = draft.inputs.get(name)
+            if port is not None and not wire.slices and wire.constant is None:
+                wire = _one_field_for_another(draft, port.signal, wire, drafts)
             if not wire.slices or port is None:
                 continue
             composer = _WireComposer(draft, name, wire, drafts, check, names, problems)
@@ -67,6 +69,31 @@ def resolve_composite_wires(
             draft.flat = replace(draft.flat, wires=wires, excused=tuple(excused))
         found[path] = draft
     return found
+
+
+def _one_field_for_another(
+    reader: BlockDraft, wanted: type[Signal], wire: FlatWire, drafts: Mapping[str, BlockDraft]
+) -> FlatWire:
+    """Return the wire as one that selects the source's only field, where only that makes it fit: the
+    fields have other names, or one is a number and the other a vector of one."""
+    source = drafts.get(wire.source_block)
+    output = source.outputs.get(wire.source_port) if source is not None else None
+    if source is None or output is None or output.absent:
+        return wire
+    if len(output.signal.fields) != 1 or len(wanted.fields) != 1:
+        return wire
+    (given,), (asked,) = output.signal.fields.values(), wanted.fields.values()
+    shapes = {source.shape(given), reader.shape(asked)}
+    alike = len(shapes) == 1 or shapes == {(), (1,)}
+    if not alike or None in shapes or (given.name == asked.name and len(shapes) == 1):
+        return wire
+    if given.dtype_name != asked.dtype_name or given.quaternion != asked.quaternion:
+        return wire
+    if not source.quantity(output.name, given.name).agrees(quantity_of(asked) or UNCHECKED):
+        return wire
+    inner = FlatWire(wire.source, wire.where, truth=wire.truth)
+    element = WireElement(wire.where, inner)
+    return replace(wire, source="", slices=(WireSlice("", wire.where, (element,)),))
 
 
 @dataclass

@@ -127,6 +127,8 @@ class WireCheck:
         missing = [n for n in port.signal.fields if n not in output.signal.fields]
         if missing:
             selected = [f"{wire.source}.{n}" for n in _fitting(source, output, port)]
+            one = _one_element(source, output, target, port)
+            selected = selected or ([f"{wire.source}.{one}"] if one else [])
             candidates = self._local(selected[:3] or self._candidates(target, port), at, wire)
             self.problems.add(
                 Code.FIELD_MISSING,
@@ -273,6 +275,17 @@ def _fitting(source: BlockDraft, output: Output[Any], port: Input[Any]) -> Itera
         same = given.dtype_name == wanted.dtype_name and not more
         if same and source.quantity(output.name, name).agrees(asked):
             yield name
+
+
+def _one_element(
+    source: BlockDraft, output: Output[Any], target: BlockDraft, port: Input[Any]
+) -> str:
+    """Return ``field[0]`` where an input of one number reads an output of one vector; else nothing."""
+    if len(output.signal.fields) != 1 or len(port.signal.fields) != 1:
+        return ""
+    (given,), (wanted,) = output.signal.fields.values(), port.signal.fields.values()
+    one = target.shape(wanted) in ((), (1,)) and len(source.shape(given) or ()) == 1
+    return f"{given.name}[0]" if one and given.dtype_name == wanted.dtype_name else ""
 
 
 def _signal_text(signal: type[Signal]) -> str:
