@@ -35,11 +35,20 @@ def check(
         raise typer.BadParameter("a graph file is needed, or --schema")
     with errors_reported(as_json):
         checked = checked_file(graph, overrides or [])
+        from ..runtime.running.block_mistakes import mistakes_of
+        from ..runtime.running.kernel_checks import KernelMistake
+
+        if mistakes := mistakes_of(checked):
+            raise KernelMistake("\n".join(mistakes.values()), block=next(iter(mistakes)))
     warnings: list[str] = []
     if checked.machines:
         from ..runtime.transports.registry import open_endpoints
 
         warnings = open_endpoints(checked.machines)
+    if sum(spec.block_type.__name__ == "Integrator" for spec in checked.blocks) > 1:
+        from ..runtime.loading.euler_rings import growing_rings
+
+        warnings += growing_rings(checked)
     from ..runtime.language.recording_cost import large_recording, recording_cost
 
     large = large_recording(checked)

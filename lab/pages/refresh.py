@@ -130,6 +130,15 @@ def write_faults(file: Path) -> None:
     )
 
 
+def write_wrong_imu(file: Path) -> None:
+    """Write the effects of an IMU with wrong units and signs, by the time of their onset."""
+    refresh(
+        DOCS.parent / "extensions" / "analysis" / "analysis.md",
+        "wrong_imu",
+        fault_table(_runs_of([file])),
+    )
+
+
 def write_frontier(folder: Path) -> None:
     """Write the reach of jumps, with its picture, and the data beside which other robots' reach is
     drawn."""
@@ -360,7 +369,9 @@ class Page(NamedTuple):
 STUDIES = "aloft study graphs/studies/"
 PAGES = {
     "agreement": Page(write_agreement, "aloft bench agreement --json > FILE", "FILE"),
-    "comparisons": Page(write_comparisons, f"{STUDIES}controller.yaml", "results/controller ..."),
+    "comparisons": Page(
+        write_comparisons, f"{STUDIES}formulations.yaml", "results/formulations ..."
+    ),
     "effects": Page(write_effects, f"{STUDIES}effects.yaml", "results/effects/summary.json"),
     "every_robot": Page(write_every_robot, "aloft bench every_robot --json > FILE", "FILE"),
     "mutated_robots": Page(
@@ -369,6 +380,9 @@ PAGES = {
     "excerpts": Page(write_excerpts),
     "export": Page(write_export, "aloft bench export --tsid FOLDER --json > FILE", "FILE"),
     "faults": Page(write_faults, f"{STUDIES}faults.yaml", "results/faults/summary.json"),
+    "wrong_imu": Page(
+        write_wrong_imu, f"{STUDIES}wrong_imu.yaml", "results/wrong_imu/summary.json"
+    ),
     "frontier": Page(write_frontier, "aloft bench frontier", "results/frontier"),
     "ground": Page(write_ground, f"{STUDIES}ground.yaml", "results/ground/summary.json"),
     "known_effects": Page(

@@ -75,7 +75,7 @@ BASE: tuple[Column, ...] = (
     ("attitude in flight [mrad]", "estimator_attitude_flight_rms_rad", "", 1e3),
     ("attitude at touchdown [mrad]", "estimator_attitude_touchdown_rad", "", 1e3),
 )
-COLUMNS = {"formulations": JUMP, "controller": JUMP, "estimator": BASE}
+COLUMNS = {"formulations": JUMP, "estimator": BASE}
 """The metrics that a study's table shows."""
 AXES = ("jump", "task", "arm")
 """Axes that distinguish the rows of a table, where they differ."""

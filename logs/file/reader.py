@@ -304,7 +304,27 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         reason = " ".join(str(error).split())
         raise RecordingError(f"{path} has a header that aloft does not write: {reason}") from error
-    return RecordedRun(path, header, outcome, ordered, found)
+    run = RecordedRun(path, header, outcome, ordered, found)
+    if not found.sealed and not damaged:
+        _expect_nothing_left_out(run)
+    return run
+
+
+def _expect_nothing_left_out(run: RecordedRun) -> None:
+    """Raise ``RecordingError`` where another program that wrote the file again has left something out."""
+    by = f"{run.path} was written again by another program, which left out"
+    if any(
+        "tick" not in b.schema.names for _, b in tables(run.scan, Content.KEYFRAME, f"/{KEYFRAMES}")
+    ):
+        raise RecordingError(
+            f"{by} the timeline 'tick'; keep it, or use the recording as aloft wrote it"
+        )
+    lost = run.missing_ticks - run.dropped_ticks
+    if run.outcome is not None and lost > 0:
+        raise RecordingError(
+            f"{by} {lost} ticks, as `rerun rrd split` and `filter` do; it has {len(run.ticks)}. Use the recording "
+            "as aloft wrote it; aloft.logs.read(FILE, damaged=True) reads the rest"
+        )
 
 
 def _made_by(header: str) -> tuple[Any, str]:

@@ -7,7 +7,7 @@ import copy
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from .expressions import indices_of, shown
+from .expressions import indices_of, repeats, shown
 from .kinds import NUMBER, ArrayKind
 from .slices import Cut, Slices, called, minus, plus
 
@@ -134,7 +134,7 @@ class ArrayEquations(Slices):
         if isinstance(node, ast.Name | ast.Attribute | ast.Subscript):
             places = places[len(places) - kind.rank :]
             places = [
-                ast.Constant(0) if size == 1 else place
+                ast.Constant(0) if repeats(size) else place
                 for size, place in zip(kind.shape, places, strict=True)
             ]
             part = self._part(node, places)
@@ -297,7 +297,7 @@ class ArrayEquations(Slices):
             )
         if isinstance(kind, ArrayKind) and kind.rank:
             pairs = zip(target.shape[::-1], kind.shape[::-1], strict=False)
-            if any(None not in (a, b) and a != b and not _repeats(b) for a, b in pairs):
+            if any(None not in (a, b) and a != b and not repeats(b) for a, b in pairs):
                 raise self._error(
                     node,
                     f"a value of shape {shown(kind.shape)} does not fit into {shown(target.shape)}",
@@ -442,11 +442,6 @@ def _numbers(index: tuple[str, ...]) -> set[int] | None:
     if first < 0 or (rest and rest[1] > 10_000):
         return None
     return {first + rest[0] * k for k in range(rest[1])} if rest else {first}
-
-
-def _repeats(size: int | None) -> bool:
-    """Return whether a dimension of one element stands for all places of another's."""
-    return size == 1 and type(size) is int
 
 
 def _number(kind: type, part: ast.expr, place: ast.AST) -> ast.expr:

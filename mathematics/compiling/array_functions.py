@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import copy
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -153,11 +154,9 @@ class ArrayFunctions(ArrayEquations):
         return any(kind is None for kind in kinds) and not all(kind is None for kind in kinds)
 
     def _number_call(self, node: ast.Call, name: str) -> ast.expr:
-        from . import numpy_numbers
-
         if len(node.args) != _TAKES.get(name, 1):
             return node
-        self._scope.setdefault(NUMBERS, numpy_numbers)  # type: ignore[attr-defined]  # a module's names
+        self._scope.setdefault(NUMBERS, _numbers())  # type: ignore[attr-defined]  # a module's names
         return ast.Call(
             ast.Attribute(ast.Name(NUMBERS, ast.Load()), name, ast.Load()), node.args, []
         )
@@ -272,8 +271,6 @@ class ArrayFunctions(ArrayEquations):
         return name
 
     def _room(self, node: ast.expr, kind: ArrayKind) -> ast.Name:
-        from . import numpy_numbers
-
         sizes = [size for size in kind.shape if size is not None]
         if len(sizes) < kind.rank or any(type(size) is not int for size in sizes):
             raise self._error(
@@ -288,7 +285,7 @@ class ArrayFunctions(ArrayEquations):
             raise self._error(
                 node, f"an array of {count} elements belongs in Scratch, as in scratch.x[:] = ..."
             )
-        self._scope.setdefault(NUMBERS, numpy_numbers)  # type: ignore[attr-defined]  # a module's names
+        self._scope.setdefault(NUMBERS, _numbers())  # type: ignore[attr-defined]  # a module's names
         room = ast.Attribute(ast.Name(NUMBERS, ast.Load()), "room", ast.Load())
         dtype = {float: "float64", int: "int64", bool: "bool"}[kind.element]
         shape = ast.Tuple([ast.Constant(size) for size in sizes], ast.Load())
@@ -412,6 +409,11 @@ class ArrayFunctions(ArrayEquations):
         if self._constant_of(node) is not None:
             return int
         return self._element_type(node)
+
+
+def _numbers() -> Any:
+    """Return the module ``numpy_numbers``, which has kernels and so is imported after what marks them."""
+    return import_module(f"{__package__}.numpy_numbers")
 
 
 def _filled_in(text: str, names: dict[str, str], element: ast.expr | None = None) -> list[ast.stmt]:

@@ -22,7 +22,7 @@ import ast
 import copy
 import linecache
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from types import CodeType
 from typing import Any
@@ -30,7 +30,7 @@ from typing import Any
 from .array_loops import ArrayLoops
 from .expressions import EquationError as EquationError  # noqa: PLC0414  also imported from here
 from .expressions import cross as cross  # noqa: PLC0414
-from .expressions import indices_of
+from .expressions import indices_of, shown
 from .kernel_registry import is_kernel, written_code
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kinds
 from .slices import Cut, counters_of
@@ -51,7 +51,8 @@ def expanded_code(function: Any, code: CodeType) -> CodeType:
     module = ast.fix_missing_locations(ast.Module([definition], []))
     compiled = compile(module, code.co_filename, "exec", dont_inherit=True)
     (made,) = (each for each in compiled.co_consts if isinstance(each, CodeType))
-    return made.replace(co_qualname=code.co_qualname, co_firstlineno=code.co_firstlineno)
+    # its own first line: the others are counted from there
+    return made.replace(co_qualname=code.co_qualname)
 
 
 def expanded_definition(function: Any, code: CodeType) -> ast.FunctionDef | None:
@@ -63,6 +64,47 @@ def expanded_definition(function: Any, code: CodeType) -> ast.FunctionDef | None
     Raises:
         EquationError: a statement cannot be rewritten.
     """
+    definition = _definition(function, code)
+    if definition is None:
+        return None
+    if function.__closure__ is None:
+        rewriter = _Rewriter(function, code.co_filename)
+        definition.body = rewriter.rewritten(definition)
+    if reports_event(function):
+        definition.args.args.append(ast.arg(EVENT))
+        none = ast.Assign([_event_place()], ast.Constant(False))
+        definition.body.insert(0, ast.copy_location(none, definition.body[0]))
+    definition.decorator_list, definition.returns = [], None
+    for argument in definition.args.args:
+        argument.annotation = None
+    return definition
+
+
+def check_equations(function: Any, kinds: Mapping[str, Kind]) -> None:
+    """Check the equations of a kernel, and of those that it calls, for arguments of known sizes.
+
+    Raises:
+        EquationError: sizes do not fit, or an index is beyond an array.
+    """
+    seen: set[str] = set()
+    pending = [(function, dict(kinds))]
+    while pending:
+        each, given = pending.pop()
+        key = f"{id(each)} {given}"
+        code = written_code(each)
+        if key in seen or each.__closure__ is not None:
+            continue
+        seen.add(key)
+        definition = _definition(each, code)
+        if definition is not None:
+            rewriter = _Rewriter(each, code.co_filename)
+            rewriter.check_with(given)
+            rewriter.rewritten(definition)
+            pending += rewriter.calls
+
+
+def _definition(function: Any, code: CodeType) -> ast.FunctionDef | None:
+    """Read the definition of a function from its file; ``None`` where there is no source."""
     import inspect  # costs a start of the command line more than all of this module
 
     # not inspect.getsourcelines: for a code object it looks through the files of all modules
@@ -74,16 +116,6 @@ def expanded_definition(function: Any, code: CodeType) -> ast.FunctionDef | None
     tree = ast.parse(textwrap.dedent("".join(inspect.getblock(lines[first - 1 :]))))
     ast.increment_lineno(tree, first - 1)
     (definition,) = (node for node in tree.body if isinstance(node, ast.FunctionDef))
-    if function.__closure__ is None:
-        rewriter = _Rewriter(function, code.co_filename)
-        definition.body = rewriter.rewritten(definition)
-    if reports_event(function):
-        definition.args.args.append(ast.arg(EVENT))
-        none = ast.Assign([_event_place()], ast.Constant(False))
-        definition.body.insert(0, ast.copy_location(none, definition.body[0]))
-    definition.decorator_list, definition.returns = [], None
-    for argument in definition.args.args:
-        argument.annotation = None
     return definition
 
 
@@ -116,7 +148,15 @@ class _Rewriter(ArrayLoops):
         self._depth = 0
         """The number of loops around the present statement."""
         self._own_of_loops: set[str] = set()
+        self._checks = False
+        self.calls: list[tuple[Any, dict[str, Kind]]] = []
+        """The kernels that are called, with what they get; of a check only."""
         self._ahead: list[ast.stmt] | None = []
+
+    def check_with(self, kinds: Mapping[str, Kind]) -> None:
+        """Take these kinds of the arguments, and note which kernels are called with which."""
+        self._kinds.update(kinds)
+        self._checks = True
 
     # Statements
 
@@ -436,11 +476,39 @@ class _Rewriter(ArrayLoops):
             kinds = list(argument_kinds(function).values())
             node.args = self._by_position(node, function)
             node.keywords = []
+            if self._checks:
+                self._note_call(node, function)
         node.args = [
             self._argument(each, kind)
             for each, kind in zip(node.args, [*kinds, *[NUMBER] * len(node.args)], strict=False)
         ]
         return node
+
+    def _note_call(self, node: ast.Call, function: Any) -> None:
+        """Note what a kernel gets, where its own declarations are no wiser."""
+        kinds: dict[str, Kind] = {}
+        for (name, declared), each in zip(
+            argument_kinds(function).items(), node.args, strict=False
+        ):
+            given = self._kind(each)
+            if isinstance(declared, ArrayKind) and isinstance(given, ArrayKind):
+                if declared.rank != given.rank and given.rank:
+                    text = f"{function.__qualname__} takes {name} of {declared.rank} dimensions, and gets {given.rank}"
+                    raise self._error(node, text)
+                pairs = zip(declared.shape, given.shape, strict=False)
+                for size, found in pairs:
+                    if None not in (size, found) and size != found:
+                        text = f"{function.__qualname__} takes {name} of shape {shown(declared.shape)}, and gets {shown(given.shape)}"
+                        raise self._error(node, text)
+                if declared.rank == given.rank:
+                    shape = tuple(
+                        found if size is None else size
+                        for size, found in zip(declared.shape, given.shape, strict=True)
+                    )
+                    kinds[name] = declared._replace(shape=shape)
+            elif isinstance(declared, RecordKind) and isinstance(given, RecordKind):
+                kinds[name] = given
+        self.calls.append((function, kinds))
 
     def _argument(self, node: ast.expr, wanted: Kind) -> ast.expr:
         """Rewrite an argument of a call; a kernel may take a scalar field as the array that it

@@ -116,8 +116,6 @@ class Expressions:
                 if function.attr in ("floor", "ceil", "trunc")
                 else (bool if function.attr.startswith("is") else float)
             )
-        from .numpy_numbers import FLAGS, KEEPING
-
         return bool if function.attr in FLAGS else None if function.attr in KEEPING else float
 
     def _joined(
@@ -148,9 +146,9 @@ class Expressions:
         for one, other in zip(
             (*[1] * (rank - len(a)), *a), (*[1] * (rank - len(b)), *b), strict=True
         ):
-            if None not in (one, other) and one != other and 1 not in (one, other):
+            if None not in (one, other) and one != other and not (repeats(one) or repeats(other)):
                 raise self._error(node, f"shapes {shown(a)} and {shown(b)} do not fit together")
-            made.append(other if one == 1 or one is None else one)
+            made.append(other if repeats(one) or one is None else one)
         return tuple(made)
 
     def _without_number(self, node: ast.expr) -> Kind:
@@ -326,6 +324,12 @@ def is_slice(index: ast.expr) -> bool:
     return isinstance(index, ast.Slice) or hasattr(index, "length")
 
 
+def repeats(size: int | None) -> bool:
+    """Return whether a dimension of one element stands for all places of another's; one whose size
+    only a call tells is not repeated."""
+    return size == 1 and type(size) is int
+
+
 def shown(shape: Sequence[int | None]) -> str:
     """Return a shape as text."""
     sizes = ["?" if size is None else str(int(size)) for size in shape]
@@ -334,5 +338,9 @@ def shown(shape: Sequence[int | None]) -> str:
 
 _WIDTHS = (bool, int, float)
 _ELEMENTS: Mapping[str, type] = {"float64": float, "int64": int, "bool": bool}
+FLAGS = ("isnan", "isfinite", "isinf")
+"""NumPy's functions of a number that answer with a flag."""
+KEEPING = ("maximum", "minimum", "clip", "sign")
+"""Those that answer with a whole number for whole numbers."""
 NUMBERS = "__aloft_numbers__"
 """Name in a kernel's module under which ``numpy_numbers`` stands for rewritten code."""

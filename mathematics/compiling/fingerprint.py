@@ -99,6 +99,12 @@ def _texts(function: Any, by_source: bool) -> Iterator[str]:
             if isinstance(value, type) and issubclass(value, IntEnum):
                 yield f"|{name}={[(member.name, int(member)) for member in value]}"
                 continue
+            if type(value).__module__.startswith("numba."):
+                from .numba_calls import is_numba, source_of
+
+                if is_numba(value):
+                    yield f"|{name}={source_of(value)}"
+                    continue
             if isinstance(value, np.ndarray):  # whose text leaves elements out
                 digest = hashlib.blake2b(np.ascontiguousarray(value).tobytes(), digest_size=16)
                 yield f"|{name}={value.dtype}{value.shape}{digest.hexdigest()}"

@@ -13,7 +13,7 @@ import numpy as np
 
 from .arguments import ArgumentType, RecordType
 from .array_code import SIZE_BITS, FunctionCode
-from .failures import Site
+from .failures import Failure, Site
 from .known_functions import ELEMENTWISE, FUNCTIONS, write_elements, write_product
 from .llvm_code import (
     BOOL,
@@ -357,7 +357,8 @@ class ExpressionTranslator:
 
     def _call_kernel(self, made: Translated, arguments: Sequence[Value]) -> Value:
         code = self._code
-        self._callees[made.name] = made
+        if made.text:
+            self._callees[made.name] = made
         results = code.variable(made.returns)
         operands = [
             f"{leaf} {part}"
@@ -366,7 +367,10 @@ class ExpressionTranslator:
         ]
         operands += [f"ptr {place}" for place in results]
         status = code.result(f'call i32 @"{made.name}"({", ".join(operands)})')
-        if made.fails:
+        if not made.text:  # of numba
+            code.fail_if(code.result(f"icmp ne i32 {status}, 0"), Failure.NUMBA)
+            self._code.declared |= made.declared
+        elif made.fails:
             code.pass_on(status)
         return code.load(made.returns, results) if results else NOTHING
 

@@ -148,9 +148,3 @@ def isfinite(x: float) -> bool:
 @kernel
 def isinf(x: float) -> bool:
     return abs(x) == math.inf
-
-
-FLAGS = frozenset(("isnan", "isfinite", "isinf"))
-"""Functions that answer with a flag."""
-KEEPING = frozenset(("maximum", "minimum", "clip", "sign"))
-"""Functions of whole numbers that answer with a whole number."""

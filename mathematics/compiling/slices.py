@@ -92,6 +92,10 @@ class Slices(Expressions):
             part.upper is None or upper is not None
         )
         if known and size is not None:
+            most = max(b for b in (lower, upper, 0) if b is not None)
+            if type(size) is not int and step == 1 and most > size:
+                text = f"{ast.unparse(node)} reaches beyond {ast.unparse(node.value)}, which has {int(size)} elements"
+                raise self._error(node, text)
             places = range(*slice(lower, upper, step).indices(size))
             cut = Cut(ast.Constant(places.start), step, ast.Constant(len(places)))
         else:

@@ -112,8 +112,8 @@ def variables_near(problem: SimpleProblem, plan: PlannedJump) -> Array:
         values = [rate * at(velocity, later), gain]
         if grid.phases[k] is not Phase.FLIGHT:
             values.append(at(force, 0.5 * (time + later)))
-        values = np.concatenate(values)
-        found[control : control + len(values)] = values
+        controls = np.concatenate(values)
+        found[control : control + len(controls)] = controls
     return np.clip(found, problem.lower, problem.upper)
 
 

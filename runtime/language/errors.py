@@ -87,6 +87,8 @@ class RunError(AloftError):
 
     def __init__(self, message: str, *, block: str = "", tick: int = -1) -> None:
         super().__init__(message)
+        self.exit_code = ExitCode.RUN_FAILED
+        """``BAD_INPUT`` where a block cannot be right before anything has moved."""
         self.block = block
         self.tick = tick
         self.record_tick = False

@@ -291,8 +291,11 @@ def _array(node: Node, field: Field, owner: BlockDraft) -> tuple[Any, str]:
     own = field.unit
     if field.inferred:
         own = own_unit(node) or ONE
+    names = {} if field.values is None else {each.name: int(each) for each in field.values}
+    if names:
+        expected = f"{listing(names)}, or {expected}"
     try:
-        value = _numbers(node, own, types)
+        value = _numbers(node, own, types, names)
         array = np.asarray(value, np.float64)
     except (TypeError, ValueError, OverflowError):
         return None, expected
@@ -303,10 +306,14 @@ def _array(node: Node, field: Field, owner: BlockDraft) -> tuple[Any, str]:
     return value, ""
 
 
-def _numbers(node: Node, unit: Unit | None, types: tuple[type, ...]) -> Any:
-    """Plain numbers. Raises ``ValueError`` for anything else."""
+def _numbers(
+    node: Node, unit: Unit | None, types: tuple[type, ...], names: Mapping[str, int]
+) -> Any:
+    """Plain numbers, also for the ``names`` of an enumeration. Raises ``ValueError`` for anything else."""
     if isinstance(node, ScalarNode):
         value = node.value
+        if isinstance(value, str) and value.upper() in names:
+            return names[value.upper()]
         if isinstance(value, str) and unit is not None:
             try:
                 return parse_quantity(value, unit.text)
@@ -317,7 +324,7 @@ def _numbers(node: Node, unit: Unit | None, types: tuple[type, ...]) -> Any:
         return value
     if isinstance(node, MapNode):
         raise TypeError("a mapping is not a number")
-    return [_numbers(item, unit, types) for item in node.items]
+    return [_numbers(item, unit, types, names) for item in node.items]
 
 
 def _short(node: Node) -> str:

@@ -1,10 +1,10 @@
-"""Kernels drawn from the whole language are NumPy's, and Numba's; see ``lab/kernel_grammar.py``."""
+"""Kernels drawn from the whole language are NumPy's, and Numba's; see ``lab/judge_kernels.py``."""
 
 from __future__ import annotations
 
 import pytest
 
-from aloft.lab.kernel_grammar import judge
+from aloft.lab.judge_kernels import judge
 
 
 def test_drawn_kernels_are_numpys(tmp_path, monkeypatch) -> None:
