@@ -28,6 +28,7 @@ from ...language.parameters import Parameters
 from ...language.quantities import UNCHECKED, quantity_of
 from ...language.selection import Selection, runs, select
 from ...language.signals import Field, Signal
+from ..flattening.written_wires import is_name
 from .block_check import BlockDraft
 from .inserted import GatherPiece, gather_block_type, read_values, selected_signal
 from .wire_check import WireCheck
@@ -160,6 +161,15 @@ class _WireComposer:
                     fix=f"{similar[0]}: {text_of(plain_slice(wire_slice))}" if similar else "",
                 )
                 return None
+            literal = wire_slice.items[0].literal if wire_slice.items else None
+            if literal is not None and is_name(literal) and fields[name].values is None:
+                self._report(
+                    f"{self.at}: {name} cannot be {text_of(plain_slice(wire_slice))}",
+                    literal.where,
+                    expected="a source, block.port.field, or a number",
+                    found=text_of(plain_slice(wire_slice)),
+                )
+                return None
             found[name] = wire_slice
         missing = [name for name in fields if name not in found]
         if missing:
@@ -197,8 +207,8 @@ class _WireComposer:
                 filled = self._constant_field(name, field, item)
                 if filled is None:
                     return
-                values, shape = filled
-                self.pieces.append(GatherPiece(name, numbers=values))
+                numbers, shape = filled
+                self.pieces.append(GatherPiece(name, numbers=numbers))
                 self.fields[name] = (shape, field.dtype_name)
                 return
             if item.literal is not None:

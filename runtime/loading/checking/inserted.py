@@ -294,8 +294,6 @@ def _array(node: Node, field: Field, owner: BlockDraft) -> tuple[Any, str]:
     names = {} if field.values is None else {each.name: int(each) for each in field.values}
     if names:
         expected = f"{listing(names)}, or {expected}"
-    elif isinstance(node, ScalarNode) and isinstance(node.value, str) and node.value.isidentifier():
-        expected = f"{expected}; a source is block.port.field"
     try:
         value = _numbers(node, own, types, names)
         array = np.asarray(value, np.float64)

@@ -146,10 +146,29 @@ class WireCheck:
                 f"{at} does not fit {written}: {mismatch.message}",
                 wire.where,
                 **other,
-                expected=mismatch.expected,
+                expected=mismatch.expected + self._width_of(target, name, mismatch),
                 found=mismatch.found,
                 fix=mismatch.fix,
             )
+
+    def _width_of(self, target: BlockDraft, name: str, mismatch: Mismatch) -> str:
+        """Return where the width that an input has comes from, if it follows from another wire."""
+        field = (
+            next(iter(target.inputs[name].signal.fields.values()))
+            if name in target.inputs
+            else None
+        )
+        size = field.shape[0] if field is not None and len(field.shape) == 1 else None
+        entry = target.flat.parameters.get(size) if isinstance(size, str) else None
+        if mismatch.code is not Code.SHAPE or entry is None or entry.key_where != target.flat.where:
+            return ""
+        for other, port in target.inputs.items():
+            wire = target.flat.wires.get(other)
+            if other == name or wire is None:
+                continue
+            if any(field.shape == (size,) for field in port.signal.fields.values()):
+                return f", as {target.flat.path}.{other} from {wire.shown or wire.source}"
+        return ""
 
     def check_output(self, at: str, wire: FlatWire) -> None:
         """Report a sub-graph's output whose source does not exist."""
