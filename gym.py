@@ -27,9 +27,10 @@ from typing import Any
 
 import numpy as np
 
+from .files.pip_line import pip_line
 from .mathematics.arrays import Array
 from .runtime.graph import Graph, load
-from .runtime.language.errors import AloftError, pip_line
+from .runtime.language.errors import AloftError
 from .runtime.language.signals import Signal
 from .runtime.running.stepping import SteppedRun
 

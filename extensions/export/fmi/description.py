@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from ....files.names import is_file_name
+from ....files.pip_line import pip_line
 from ....runtime.language.block import Block
-from ....runtime.language.errors import BlockError, UnitError, pip_line
+from ....runtime.language.errors import BlockError, UnitError
 from ....runtime.language.signals import Field, Signal
 from ....runtime.language.units import BASE_UNITS, Unit, parse_unit
 
