@@ -45,6 +45,10 @@ def check(
         from ..runtime.transports.registry import open_endpoints
 
         warnings = open_endpoints(checked.machines)
+    if sum(spec.block_type.__name__ == "Integrator" for spec in checked.blocks) > 1:
+        from ..runtime.running.euler_rings import growing_rings
+
+        warnings += growing_rings(checked)
     from ..runtime.language.recording_cost import large_recording, recording_cost
 
     large = large_recording(checked)
