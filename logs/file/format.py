@@ -39,7 +39,7 @@ from __future__ import annotations
 import json
 from base64 import b64decode, b64encode
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from hashlib import blake2b
 from math import prod
 from typing import Any, Self
@@ -232,7 +232,10 @@ class Header:
 
     def to_json(self) -> str:
         """Write the header as JSON text."""
-        data = asdict(self) | {"schema_hashes": self.schema_hashes}
+        plain = replace(
+            self, robot=None, bus_start=b""
+        )  # which asdict would copy, every mesh of it
+        data = asdict(plain) | {"schema_hashes": self.schema_hashes}
         data["robot"] = self.robot and self.robot.model_dump(mode="json", context={"looks": True})
         data["bus_start"] = b64encode(self.bus_start).decode()
         return json.dumps(data)

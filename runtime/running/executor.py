@@ -327,6 +327,9 @@ class Executor:
         metrics, unmet, success_reason = merge_metrics(by_block)
         unmet = unmet or self._too_late(ticks)
         judges = [path for path, of_block in by_block.items() if of_block.get("reason")]
+        ended = by_block.get(self.bound.clock.stopped_by, {})
+        if not ended.get("success", True) and ended.get("reason"):
+            unmet = str(ended["reason"])  # the cause, before what follows from it
         unmet, success_reason = (
             self._with_stop(unmet, judges),
             self._with_stop(success_reason, judges),
