@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Array1D
+from ...mathematics.arrays import Array, Array1D, Flags
+from ...runtime.language.errors import UnitError
 from ...runtime.language.parameters import Parameters, parameter
-from ...runtime.language.units import UnitError, parse_unit
+from ...runtime.language.units import parse_unit
 from .log_file import LogError, LogFile
 
 MOST_JITTER = 0.2
@@ -74,18 +75,26 @@ def numbers(
             raise LogError(
                 f"{what} of {', '.join(names)} has {len(given)} numbers, expected 1 or {width}"
             )
-    factor = 1.0
-    text = spec.unit or next((each.unit for each in found if each.unit), None)
-    if text is not None and unit:
-        try:
-            given_unit, wanted = parse_unit(text), parse_unit(unit)
-        except UnitError as error:
-            raise LogError(f"unit of {', '.join(names)}: {error}") from None
-        if not given_unit.same_dimension(wanted):
-            raise LogError(f"{', '.join(names)} is in {text}, expected a unit like {unit}")
-        factor = given_unit.factor_to(wanted)
-    values = (values - np.array(spec.offset)) * np.array(spec.scale) * factor
+    factors = [
+        _factor(spec.unit or each.unit, unit, name)
+        for name, each in zip(names, found, strict=True)
+        for _ in range(each.values.shape[1])
+    ]
+    values = (values - np.array(spec.offset)) * np.array(spec.scale) * np.array(factors)
     return values, found[0].stamps
+
+
+def _factor(given: str | None, wanted: str, name: str) -> float:
+    """Return the factor from a column's unit to the one that is wanted."""
+    if given is None or not wanted:
+        return 1.0
+    try:
+        found, expected = parse_unit(given), parse_unit(wanted)
+    except UnitError as error:
+        raise LogError(f"unit of {name}: {error}") from None
+    if not found.same_dimension(expected):
+        raise LogError(f"{name} is in {given}, expected a unit like {wanted}")
+    return found.factor_to(expected)
 
 
 def stamps_of(log: LogFile, clock: LogClock, rows: int, own: Array1D | None) -> Array1D:
@@ -156,17 +165,19 @@ def mean_over(stamps: Array1D, values: Array, times: Array1D, period: float) -> 
     return np.where(span[:, None] > 1e-9, means, at_times(stamps, values, times))
 
 
-def repeats_of(values: Array) -> Array1D:
+def repeats_of(values: Array) -> Flags:
     """Return for each row (n,) whether it is exactly the row before: a sample that was not renewed."""
-    return np.concatenate([[False], (values[1:] == values[:-1]).all(axis=1)])
+    same: Flags = (values[1:] == values[:-1]).all(axis=1)
+    return np.concatenate([np.zeros(1, bool), same])
 
 
-def with_hysteresis(force: Array1D, closes: float, opens: float) -> Array1D:
+def with_hysteresis(force: Array1D, closes: float, opens: float) -> Flags:
     """Return whether a switch is closed at each force (n,): it closes above ``closes`` and opens below ``opens``."""
     change = np.where(force > closes, 1, np.where(force < opens, -1, 0))
     change[0] = change[0] or (1 if force[0] >= opens else -1)
     last = np.maximum.accumulate(np.where(change != 0, np.arange(len(force)), 0))
-    return change[last] > 0
+    closed: Flags = change[last] > 0
+    return closed
 
 
 def match_joints(names: Sequence[str], robot: Sequence[str]) -> tuple[list[int], list[str]]:

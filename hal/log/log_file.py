@@ -76,7 +76,7 @@ def read_log(path: Path) -> LogFile:
     """
     try:
         reader = _reader(path)
-        log = reader(path)
+        log: LogFile = reader(path)
     except LogError:
         raise
     except ModuleNotFoundError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -21,64 +21,14 @@ from ...blocks.signals import (
 from ...blocks.signals.robot import HEALTHY
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Clock, Context, Input, Metric, Output, UnmetRequirement
-from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.parameters import Parameters
 from ..robot import Robot
-from .columns import Columns, LogClock
 from .log_file import LogError, LogFile, read_log
+from .parameters import LogParameters
 from .played_log import PlayedLog, PlayedRows, play
 
 EXAMPLE = Path(__file__).with_name("example.csv")
 """Eleven rows of a gyroscope and an accelerometer at rest, made by hand."""
-
-
-class LogImu(Parameters):
-    """The columns of the IMU, and where it sits."""
-
-    angular_velocity: Columns = parameter(text="three columns of the gyroscope [rad/s]")
-    specific_force: Columns = parameter(text="three columns of the accelerometer [m/s^2]")
-    sensor: str | None = parameter(
-        None,
-        text="a sensor of the robot's description on the base: its place and turn are the IMU's",
-    )
-    position: list[float] = parameter(
-        [0.0, 0.0, 0.0], unit="m", text="place from the base's origin, if no sensor is named"
-    )
-    rpy: list[float] = parameter(
-        [0.0, 0.0, 0.0], unit="rad", text="turn from the base's axes: roll, pitch, yaw"
-    )
-
-
-class LogJoints(Parameters):
-    """The columns of the joints."""
-
-    names: list[str] | str | None = parameter(
-        None,
-        text="joints in the columns' order, or the file's list of them; none: the robot's joints",
-    )
-    position: Columns = parameter(text="a column for each joint [rad]")
-    velocity: Columns | None = parameter(
-        None, text="their speeds [rad/s]; none: differences of the angles"
-    )
-    torque: Columns | None = parameter(None, text="their torques [N m]; none: zeros")
-
-
-class LogContact(Parameters):
-    """The columns of one foot's contact."""
-
-    force: Columns | None = parameter(None, text="a column of the vertical force [N]")
-    closes: float = parameter(20.0, unit="N", text="force above which the switches close")
-    opens: float = parameter(10.0, unit="N", text="force below which they open")
-    closed: Columns | None = parameter(
-        None, text="in place of a force: a column that is not zero in contact"
-    )
-
-
-class LogTruth(Parameters):
-    """The columns of motion capture, in a world of its own."""
-
-    position: Columns = parameter(text="three columns of the base's origin [m]")
-    rpy: Columns | None = parameter(None, text="roll, pitch, yaw of the base [rad]")
-    quaternion: Columns | None = parameter(None, text="in place of them: x, y, z, w")
 
 
 class LogRobot(Robot):
@@ -107,24 +57,8 @@ class LogRobot(Robot):
     to the base.
     """
 
-    class Params(Parameters):
-        file: str = parameter(
-            text="the log, relative to the graph's folder; a folder is a ROS 2 bag"
-        )
-        clock: LogClock = parameter(LogClock(), text="when rows were taken")
-        imu: LogImu | None = parameter(None, text="the IMU")
-        joints: LogJoints | None = parameter(None, text="the joints; none: they stand")
-        contacts: dict[str, LogContact] = parameter({}, text="by the name of a foot")
-        truth: LogTruth | None = parameter(None, text="motion capture")
-        between: Literal["linear", "hold", "mean"] = parameter(
-            "linear", text="rule between two rows"
-        )
-        begin: float = parameter(0.0, unit="s", ge=0.0, text="of the log, at which the run begins")
-        end: float | None = parameter(
-            None, unit="s", gt=0.0, text="of the log, at which the run ends"
-        )
-
-    params: Params
+    Params = LogParameters
+    params: LogParameters
     needs = ("robot",)
     outside = "no"
 
@@ -134,7 +68,7 @@ class LogRobot(Robot):
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report all that the log or the robot lacks, and a log that is shorter than the run."""
-        assert isinstance(params, cls.Params) and context.robot is not None
+        assert isinstance(params, LogParameters) and context.robot is not None
         try:
             log = opened(context.folder / params.file)
         except LogError as error:
@@ -168,13 +102,14 @@ class LogRobot(Robot):
         self.played: PlayedLog = play(log, self.params, self.robot, self.period)
         if self.played.problems:
             raise LogError("; ".join(problem.message for problem in self.played.problems))
+        assert self.played.rows is not None
         self.rows = self.played.rows
         self.last_tick = len(self.rows.imu) - 1
         self.period_ticks = self.context.period_ticks
 
     @kernel
     @staticmethod
-    def emit(
+    def emit(  # type: ignore[override]  # a kernel, which names what it takes
         imu: ImuReading,
         joints: JointState,
         contacts: ContactSwitches,
@@ -208,6 +143,18 @@ class LogRobot(Robot):
         health.imu_valid = rows.imu_valid[i]
         health.joints_valid = rows.joints_valid[i]
         health.imu_age = rows.imu_age[i]
+        truth.com[:] = 0.0
+        truth.com_velocity[:] = 0.0
+        truth.angular_momentum[:] = 0.0
+        truth.contact_position[:] = 0.0
+        truth.contact_force[:] = 0.0
+        truth.ground_height[:] = 0.0
+        truth.forbidden_contacts = 0
+        truth.joint_limit_violation = 0.0
+        truth.motor_torque[:] = 0.0
+        truth.motor_speed[:] = 0.0
+        truth.motor_overload = 0.0
+        truth.saturated_share = 0.0
         truth.base_position[:] = rows.pose[i, 0:3]
         truth.base_orientation[:] = rows.pose[i, 3:7]
         truth.base_linear_velocity[:] = rows.twist[i, 0:3]
@@ -217,7 +164,7 @@ class LogRobot(Robot):
 
     @kernel
     @staticmethod
-    def update(clock: Clock, last_tick: int, period_ticks: int) -> bool:
+    def update(clock: Clock, last_tick: int, period_ticks: int) -> bool:  # type: ignore[override]
         return clock.tick // period_ticks >= last_tick
 
     def on_event(self) -> None:

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Array1D, Array2D, Flags1D, Flags2D
+from ...mathematics.arrays import Array, Array1D, Array2D, Flags, Flags1D, Flags2D
 from ...robots.description import RobotDescription
 from .columns import (
     MOST_JITTER,
@@ -24,9 +24,7 @@ from .columns import (
     with_hysteresis,
 )
 from .log_file import LogError, LogFile
-
-if TYPE_CHECKING:
-    from .log_robot import LogRobot
+from .parameters import LogParameters
 
 MANY_REPEATS = 0.02
 """A share of samples that repeat the one before, above which there is a warning."""
@@ -89,7 +87,7 @@ class _Player:
     """Takes the columns of a log; every mistake is noted, and none ends it."""
 
     def __init__(
-        self, log: LogFile, params: LogRobot.Params, robot: RobotDescription, period: float
+        self, log: LogFile, params: LogParameters, robot: RobotDescription, period: float
     ) -> None:
         self.log, self.params, self.robot, self.period = log, params, robot, period
         self.played = PlayedLog()
@@ -130,9 +128,7 @@ class _Player:
         return at_times(series.stamps, series.values, self.times, hold or between == "hold")
 
 
-def play(
-    log: LogFile, params: LogRobot.Params, robot: RobotDescription, period: float
-) -> PlayedLog:
+def play(log: LogFile, params: LogParameters, robot: RobotDescription, period: float) -> PlayedLog:
     """Return what a log plays at the ticks of a ``period`` [s]; with problems it has no rows."""
     player = _Player(log, params, robot, period)
     played, names = player.played, [joint.name for joint in robot.joints]
@@ -351,7 +347,7 @@ def _rows(
     )
 
 
-def _validity(player: _Player, stamps: Array1D, repeated: Array1D) -> tuple[Array1D, Array1D]:
+def _validity(player: _Player, stamps: Array1D, repeated: Flags) -> tuple[Flags, Array1D]:
     """Return at the ticks whether the last sample is a new one, and its age [s]."""
     last = np.clip(
         np.searchsorted(stamps, player.times + 1e-9, side="right") - 1, 0, len(stamps) - 1
