@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -22,12 +23,32 @@ and functions that a start makes and that all stay. A check of a jump makes 100 
 
 def main() -> None:
     """Run the command line and leave with one of ``ExitCode``."""
+    if sys.argv[1:] in ([], ["--help"], ["--version"]):  # these import neither Typer nor a verb
+        _print_page()
+        sys.exit(0)
     gc.set_threshold(*COLLECTED_AFTER)
     # Else Pydantic looks through all installed packages for plugins, a tenth of a start.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     from .app import main as run_command_line
 
     run_command_line()
+
+
+def _print_page() -> None:
+    """Print the version, or the list of all verbs."""
+    if sys.argv[1:] == ["--version"]:
+        from .. import __version__
+
+        text = f"aloft {__version__}\n"
+    else:
+        from .verbs import help_page
+
+        text = help_page()
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:  # `aloft --help | head`
+        sys.stderr.close()
 
 
 def make_app(verbs: Iterable[str] | None = None) -> typer.Typer:

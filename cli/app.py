@@ -14,24 +14,11 @@ import typer
 
 from .. import __version__
 from ..runtime.language.errors import ExitCode
+from .shared.help_texts import name_values, whole_summaries
 from .shared.output import print_error, print_json
+from .verbs import CORE, EXIT_CODES
 
-EXIT_CODES = """\b
-Exit codes:
-  0    the graph ran and its own criteria hold
-  1    it ran to its end, but a criterion failed: a fall, a missed target
-  2    the graph, an override or the command line is wrong; nothing moved
-  3    a block failed, a signal was not finite, or a policy ended the run
-  4    the run went well, but its recording could not be written, or not all of it
-  130  stopped cleanly by SIGINT
-  137  a block hung in compiled code; the process was killed
-  143  stopped cleanly by SIGTERM
-"""
-
-VERBS = (
-    "run", "check", "graph", "blocks", "new", "test", "params", "view", "plot", "render", "log", "replay", "study",
-    "plan", "jump", "robot", "twin", "doctor",
-)  # fmt: skip
+VERBS = tuple(CORE)
 """The verbs of the core, in the order of the help. The file of each has its name, and so has what it
 offers: a command, or a group of commands. Extensions declare theirs; see ``runtime.language.extensions``."""
 
@@ -53,8 +40,7 @@ def make_app(verbs: Iterable[str] | None = None) -> typer.Typer:
     """
     app = typer.Typer(
         name="aloft",
-        help="Run, check and look at graphs of blocks.",
-        epilog=EXIT_CODES,
+        help="Control loops for robots as typed block diagrams.",
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
@@ -62,9 +48,10 @@ def make_app(verbs: Iterable[str] | None = None) -> typer.Typer:
     for verb in all_verbs() if verbs is None else verbs:
         offered = _of_the_core(verb) if verb in VERBS else _of_extensions(verb)
         if isinstance(offered, typer.Typer):
+            whole_summaries(offered)
             app.add_typer(offered)
         elif offered is not None:
-            app.command(verb, epilog=EXIT_CODES if verb == "run" else None)(offered)
+            app.command(verb, epilog="\b\n" + EXIT_CODES if verb == "run" else None)(offered)
     app.callback()(_options)
     return app
 
@@ -149,7 +136,9 @@ def main() -> None:
     # typer exports only the most special of the errors that a wrong command line raises
     usage_error = cast("type[Exception]", typer.BadParameter.__bases__[0])
     try:
-        code = make_app(chosen_verbs(sys.argv[1:]))(standalone_mode=False)
+        command = typer.main.get_command(make_app(chosen_verbs(sys.argv[1:])))
+        name_values(command)
+        code = command(standalone_mode=False)
     except usage_error as caught:
         error: Any = caught
         reason = _why_unknown(sys.argv[1:])

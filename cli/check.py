@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +16,9 @@ def check(
     graph: Annotated[Path | None, typer.Argument(help="The graph file.")] = None,
     overrides: CompletedOverrides = None,
     as_json: AsJson = False,
+    cost: Annotated[
+        bool, typer.Option("--cost", help="Say what a minute of its recording takes.")
+    ] = False,
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON Schema of graph files, for editors.")
     ] = False,
@@ -31,19 +35,35 @@ def check(
         raise typer.BadParameter("a graph file is needed, or --schema")
     with errors_reported(as_json):
         checked = checked_file(graph, overrides or [])
+        from ..runtime.running.block_mistakes import mistakes_of
+        from ..runtime.running.kernel_checks import KernelMistake
+
+        if mistakes := mistakes_of(checked):
+            raise KernelMistake("\n".join(mistakes.values()), block=next(iter(mistakes)))
     warnings: list[str] = []
     if checked.machines:
         from ..runtime.transports.registry import open_endpoints
 
         warnings = open_endpoints(checked.machines)
+    if sum(spec.block_type.__name__ == "Integrator" for spec in checked.blocks) > 1:
+        from ..runtime.running.euler_rings import growing_rings
+
+        warnings += growing_rings(checked)
+    from ..runtime.language.recording_cost import large_recording, recording_cost
+
+    large = large_recording(checked)
+    warnings += [large] if large else []
     if as_json:
         found = {"file": str(graph), "ok": True, "count": 0, "problems": [], "warnings": warnings}
+        found |= {"cost": asdict(recording_cost(checked))} if cost else {}
         print_json({"success": True, **found, "unchecked": list(checked.unchecked)})
     else:
         for text in warnings:
             typer.echo(f"warning: {text}")
         for text in checked.unchecked:
             typer.echo(f"unit not checked: {text}")
+        if cost:
+            typer.echo(f"cost: {recording_cost(checked)}")
         count, machines = len(checked.blocks), len(checked.machines)
         spread = f" on {machines} machine{'s' if machines > 1 else ''}" if machines else ""
         typer.echo(f"{graph}: no problems; {count} blocks at {checked.base_rate:g} Hz{spread}")

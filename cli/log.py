@@ -79,7 +79,7 @@ def export(
         typer.Option(help="Only this signal, port or block; may be given several times."),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="By default beside the recording.")
+        Path | None, typer.Option("--out", "-o", help="By default beside the recording.")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -195,7 +195,7 @@ def repair(file: File, as_json: AsJson = False) -> None:
 @log.command("merge")
 def merge(
     files: Annotated[list[Path], typer.Argument(help="The recordings of all parts of one run.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The recording to write.")],
+    output: Annotated[Path, typer.Option("--out", "-o", help="The recording to write.")],
     as_json: AsJson = False,
 ) -> None:
     """Put the recordings of a run's parts, made on several machines, together into one."""

@@ -91,7 +91,9 @@ def web(
     run: Run = "",
     save: Annotated[
         Path | None,
-        typer.Option(help="Where the page writes changed values; by default GRAPH-tuned.yaml."),
+        typer.Option(
+            "--out", "-o", help="Where the page writes changed values; by default GRAPH-tuned.yaml."
+        ),
     ] = None,
 ) -> None:
     """Change them in the browser, with sliders, beside the running graph's diagram."""

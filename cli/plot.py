@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,19 +27,30 @@ def plot(
     run: Annotated[Path, typer.Argument(help="The recording, a file .rrd.")],
     signals: Annotated[
         list[str],
-        typer.Argument(help="block.port.field, all fields of block.port, or one element: a.b.c[2]"),
+        typer.Argument(
+            help="block.port.field, all fields of block.port, or one element: a.b.c[2]; more "
+            "recordings first are drawn over the same axes."
+        ),
     ],
     png: Annotated[Path | None, typer.Option("--png", help="Draw into this PNG file.")] = None,
     svg: Annotated[Path | None, typer.Option("--svg", help="Draw into this SVG file.")] = None,
     start: Annotated[float | None, typer.Option("--from", help="From this time [s].")] = None,
     end: Annotated[float | None, typer.Option("--to", help="Up to this time [s].")] = None,
 ) -> None:
-    """Plot signals of a recording: in the terminal, or into a file with --png or --svg."""
+    """Plot signals of one or several recordings: in the terminal, or into a file with --png or --svg."""
     from .shared.viewing import read
 
     with errors_reported(False):
-        recorded = read(run)
-        panels = [panel for name in signals for panel in panels_of(recorded, name, start, end)]
+        files = [run, *(Path(name) for name in signals if name.endswith(".rrd"))]
+        names = [name for name in signals if not name.endswith(".rrd")]
+        if not names:
+            raise AloftError("which signals? aloft log info FILE.rrd lists them")
+        recorded = [read(file) for file in files]
+        panels = [
+            panel
+            for name in names
+            for panel in overlaid([panels_of(each, name, start, end) for each in recorded], files)
+        ]
         if svg is not None or png is not None:
             _draw(panels, run.stem, svg, png)
             return
@@ -81,6 +93,33 @@ def panels_of(run: RecordedRun, name: str, start: float | None, end: float | Non
     return panels
 
 
+def overlaid(runs: Sequence[Sequence[Panel]], files: Sequence[Path]) -> list[Panel]:
+    """Return one panel a field with the lines of all runs, which are named by their files.
+
+    Raises:
+        AloftError: the runs have other fields of that name.
+    """
+    from ..plotting import Panel
+
+    if len(runs) == 1:
+        return list(runs[0])
+    if len({len(panels) for panels in runs}) > 1:
+        raise AloftError("the recordings have different fields of that name; name one field")
+    stems = [file.stem for file in files]
+    shown = stems if len(set(stems)) == len(stems) else [str(file) for file in files]
+    return [
+        Panel(
+            same[0].title,
+            [
+                replace(line, name=f"{name} {line.name}".rstrip())
+                for name, panel in zip(shown, same, strict=True)
+                for line in panel.lines
+            ],
+        )
+        for same in zip(*runs, strict=True)
+    ]
+
+
 def _panel(run: RecordedRun, name: str, places: Sequence[int], kept: Any) -> Panel:
     from ..logs.viewing.signal_names import element_names, unit_of
     from ..plotting import Curve, Panel
@@ -88,7 +127,8 @@ def _panel(run: RecordedRun, name: str, places: Sequence[int], kept: Any) -> Pan
     field = run.signals()[name]
     values = run[name][kept].reshape(int(kept.sum()), -1).astype(np.float64)
     labels = element_names(field, run.header.robot) or [str(k) for k in range(values.shape[1])]
-    lines = [Curve(labels[k] if field.shape else "", run.time[kept], values[:, k]) for k in places]
+    named = field.shape not in ((), (1,))  # the only element needs no name
+    lines = [Curve(labels[k] if named else "", run.time[kept], values[:, k]) for k in places]
     unit = unit_of(field)
     return Panel(f"{name} [{unit}]" if unit else name, lines)
 
@@ -114,24 +154,24 @@ def _draw(panels: Sequence[Panel], title: str, svg: Path | None, png: Path | Non
 
 def in_terminal(panel: Panel) -> str:
     """Draw a panel as text: Braille dots, the range of values on the left, that of time below."""
-    x = np.asarray(panel.lines[0].x)
-    y = np.array([line.y for line in panel.lines])
+    x = np.concatenate([np.asarray(line.x) for line in panel.lines])
+    y = np.concatenate([np.asarray(line.y) for line in panel.lines])
     finite = y[np.isfinite(y)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
     if low == high:
         low, high = low - 0.5, high + 0.5
-    span = float(x[-1] - x[0]) or 1.0
-    columns = np.clip((x - x[0]) / span * (2 * _WIDTH - 1), 0, 2 * _WIDTH - 1).astype(int)
+    first, last = float(x.min()), float(x.max())
+    span = (last - first) or 1.0
     cells = np.full((_HEIGHT, _WIDTH), 0x2800)
-    for line in y:
-        good = np.isfinite(line)
-        rows = ((high - line[good]) / (high - low) * (4 * _HEIGHT - 1)).round().astype(int)
-        for column, row in zip(columns[good].tolist(), rows.tolist(), strict=True):
-            cells[row // 4, column // 2] |= _DOTS[column % 2][row % 4]
+    good = np.isfinite(y)
+    columns = np.clip((x[good] - first) / span * (2 * _WIDTH - 1), 0, 2 * _WIDTH - 1).astype(int)
+    rows = ((high - y[good]) / (high - low) * (4 * _HEIGHT - 1)).round().astype(int)
+    for column, row in zip(columns.tolist(), rows.tolist(), strict=True):
+        cells[row // 4, column // 2] |= _DOTS[column % 2][row % 4]
     rows_of_text = ["".join(map(chr, row)) for row in cells.tolist()]
     labels = {0: f"{high:.4g}", _HEIGHT - 1: f"{low:.4g}"}
     names = [line.name for line in panel.lines if line.name]
-    head = panel.title + (f": {', '.join(names)}" if len(names) > 1 else "")
+    head = panel.title + (f": {', '.join(names)}" if names else "")
     body = [f"{labels.get(number, ''):>10} {row}" for number, row in enumerate(rows_of_text)]
-    foot = f"{'':>10} {x[0]:<10.4g}{'time [s]':^{_WIDTH - 20}}{x[-1]:>10.4g}"
+    foot = f"{'':>10} {first:<10.4g}{'time [s]':^{_WIDTH - 20}}{last:>10.4g}"
     return "\n".join([head, *body, foot])

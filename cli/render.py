@@ -25,7 +25,7 @@ def render(
     ],
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="A .gif, .mp4 or .png; by default NAME.gif here."),
+        typer.Option("--out", "-o", help="A .gif, .mp4 or .png; by default NAME.gif here."),
     ] = None,
     start: Annotated[float | None, typer.Option("--from", help="The first time [s].")] = None,
     end: Annotated[float | None, typer.Option("--to", help="The last time [s].")] = None,

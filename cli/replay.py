@@ -43,9 +43,9 @@ def replay(
         ),
     ] = "auto",
     first: Annotated[
-        int | None, typer.Option("--from", help="Begin at the last keyframe before this tick.")
+        int | None, typer.Option("--from-tick", help="Begin at the last keyframe before this tick.")
     ] = None,
-    until: Annotated[int | None, typer.Option(help="End before this tick.")] = None,
+    until: Annotated[int | None, typer.Option("--until-tick", help="End before this tick.")] = None,
     swap: Annotated[
         list[str] | None,
         typer.Option(
@@ -59,14 +59,18 @@ def replay(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(help="Write recorded and replayed signals side by side to this .rrd file."),
+        typer.Option(
+            "--out",
+            "-o",
+            help="Write recorded and replayed signals side by side to this .rrd file.",
+        ),
     ] = None,
     folder: GraphFolder = None,
     trust: Trust = False,
     as_json: JsonBesideTables = False,
     quiet: Quiet = False,
 ) -> None:
-    """Execute a recorded run again and compare every byte of every tick with the recording."""
+    """Re-run a recording and check that it is bit-identical."""
     out = console(to_stderr=as_json, quiet=quiet)
     with errors_reported(as_json):
         opened = opened_recording(recording, folder, trust=trust)
@@ -140,8 +144,8 @@ def execute(
 
     if first is not None and until is not None and until <= first:
         raise AloftError(
-            f"--from {first} --until {until} is no stretch of the run: the end must lie behind the "
-            f"beginning, e.g. --from {first} --until {first + 100}"
+            f"--from-tick {first} --until-tick {until} is no stretch of the run: the end must lie behind the "
+            f"beginning, e.g. --from-tick {first} --until-tick {first + 100}"
         )
     settings = [text for texts in changed.values() for text in texts]
     graph = opened.changed(settings) if settings else opened.graph

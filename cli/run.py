@@ -96,6 +96,9 @@ class PrintingOptions:
 
     as_json: JsonBesideTables = False
     quiet: Quiet = False
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Print all metrics and the times of blocks.")
+    ] = False
     traceback: Annotated[
         bool, typer.Option("--traceback", help="Print the whole traceback of a block that fails.")
     ] = False
@@ -161,7 +164,7 @@ def run(
     compiling: CompilingOptions,
     thread: ThreadOptions,
 ) -> None:
-    """Run a graph; print its metrics and the time each block took; write a recording."""
+    """Run a graph, print the verdict and the first metrics, and write a recording."""
     from ..runtime.graph import load
     from ..runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
 
@@ -208,7 +211,7 @@ def run(
                 one_run = OneRunOptions(
                     record=None if observation.no_record else observation.record or default,
                     keep=observation.keep, split=split_time(observation.split), as_json=as_json,
-                    traceback=traceback, plain=plain, fuse=compiling.fuse, real_time=thread_options,
+                    verbose=printing.verbose, traceback=traceback, plain=plain, fuse=compiling.fuse, real_time=thread_options,
                 )  # fmt: skip
                 sinks = [endpoint] if endpoint is not None else []
                 code = run_once(

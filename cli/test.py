@@ -35,44 +35,56 @@ def test(
         ),
     ] = None,
     recording: Annotated[
-        Path | None, typer.Option("--from", help="Write a test from this recording.")
+        Path | None, typer.Option("--recording", help="Write a test from this recording.")
     ] = None,
-    block: Annotated[str, typer.Option(help="With --from: the block's path in the graph.")] = "",
+    block: Annotated[
+        str, typer.Option(help="With --recording: the block's path in the graph.")
+    ] = "",
     ticks: Annotated[
-        str, typer.Option(help="With --from: the ticks, e.g. 1200:1400 (1400 excluded).")
+        str, typer.Option(help="With --recording: the ticks, e.g. 1200:1400 (1400 excluded).")
     ] = "",
     output: Annotated[
         Path | None,
-        typer.Option(help="With --from: the file; by default test_BLOCK_FIRST_LAST.py in tests/."),
+        typer.Option(
+            "--out",
+            "-o",
+            help="With --recording: the file; by default test_BLOCK_FIRST_LAST.py in tests/.",
+        ),
     ] = None,
-    rtol: Annotated[float, typer.Option(min=0.0, help="With --from: relative tolerance.")] = 0.0,
-    atol: Annotated[float, typer.Option(min=0.0, help="With --from: absolute tolerance.")] = 0.0,
+    rtol: Annotated[
+        float, typer.Option(min=0.0, help="With --recording: relative tolerance.")
+    ] = 0.0,
+    atol: Annotated[
+        float, typer.Option(min=0.0, help="With --recording: absolute tolerance.")
+    ] = 0.0,
     robot: Annotated[
         str,
         typer.Option(help="The robot for blocks that need one; by default the graph's, or bruce."),
     ] = "",
     folder: Annotated[
         Path | None,
-        typer.Option(help="With --from: where the graph file's folder is now, if it has moved."),
+        typer.Option(
+            help="With --recording: where the graph file's folder is now, if it has moved."
+        ),
     ] = None,
     trust: Trust = False,
     as_json: AsJson = False,
 ) -> None:
     """Test blocks: that they keep what every block promises, and your own tests with pytest.
 
-    With --from, write a test instead: the block's state, inputs and outputs in a stretch of a
+    With --recording, write a test instead: the block's state, inputs and outputs in a stretch of a
     recorded run, which it must reproduce to the last bit.
     """
     out = console(to_stderr=as_json)
     with errors_reported(as_json):
         if recording is not None:
             if targets:
-                raise AloftError("with --from there is nothing else to test")
+                raise AloftError("with --recording there is nothing else to test")
             tolerances = rtol, atol
             write(recording, block, ticks, output, tolerances, folder, out, trust, as_json)
             return
         if block or ticks or output:
-            raise AloftError("--block, --ticks and --output go with --from RECORDING")
+            raise AloftError("--block, --ticks and --out go with --recording FILE")
         blocks, paths = sort_targets(targets or [])
         rows = [row for each in blocks for row in check(each, robot)]
     passed = report(rows, out)
@@ -208,7 +220,7 @@ def write(
     if not recording.is_file():
         raise AloftError(f"there is no recording {recording}")
     if not block or not ticks:
-        raise AloftError("--from needs --block NAME and --ticks FIRST:END")
+        raise AloftError("--recording needs --block NAME and --ticks FIRST:END")
     first, last = parse_ticks(ticks)
     opened = OpenedRun.of(
         recording, folder, restore=False, trust=trust

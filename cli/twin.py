@@ -20,7 +20,8 @@ def twin(
         Path | None, typer.Option(help="Its hardware file; the ports are the twin's own.")
     ] = None,
     write: Annotated[
-        Path, typer.Option(help="Where to write the hardware file with the twin's ports.")
+        Path,
+        typer.Option("--out", "-o", help="The hardware file to write, with the twin's ports."),
     ] = Path("twin.yaml"),
     virtual: Annotated[
         bool,

@@ -22,14 +22,16 @@ def view(
     web: Annotated[bool, typer.Option("--web", help="In a browser instead of a window.")] = False,
     save: Annotated[
         Path | None,
-        typer.Option(help="Also keep what is shown, as one .rrd file for any Rerun viewer."),
+        typer.Option(
+            "--out", "-o", help="Also keep what is shown, as one .rrd file for any Rerun viewer."
+        ),
     ] = None,
     layout: Annotated[
         Path | None,
         typer.Option(help="Your own tabs of plots; by default view.yaml beside the run's graph."),
     ] = None,
     no_show: Annotated[
-        bool, typer.Option("--no-show", help="With --save: only write the file.")
+        bool, typer.Option("--no-show", help="With --out: only write the file.")
     ] = False,
 ) -> None:
     """Look at a recording: the robot in 3D, its states and every signal."""
@@ -37,12 +39,12 @@ def view(
         if layout is not None and other is not None:
             raise AloftError("--layout is for one recording; leave out --with")
         if no_show and save is None:
-            raise AloftError("--no-show would do nothing; add --save FILE.rrd")
+            raise AloftError("--no-show would do nothing; add --out FILE.rrd")
         for path in (recording, *((other,) if other else ())):
             if not path.is_file():
                 raise AloftError(f"there is no recording {path}; `aloft run` writes one")
             if save is not None and save.exists() and save.samefile(path):
-                raise AloftError(f"--save {save} would overwrite the recording; name another file")
+                raise AloftError(f"--out {save} would overwrite the recording; name another file")
         with tempfile.TemporaryDirectory() as folder:
             path = save or Path(folder) / f"{recording.stem}.rrd"
             if other is not None:

@@ -11,17 +11,16 @@ A kernel runs as plain Python and as machine code, with the same bits. It is wri
 Before it runs or is compiled, ``compiling/equations`` rewrites statements on whole arrays into loops. What a
 kernel may use:
 
-* Arguments are arrays, floats, ints, bools, signals, and named tuples of these, by position; no
-  defaults, keywords or other objects. An argument says its type; ``Array1D`` and ``Array2D`` say how
-  many dimensions there are. A scalar field of a signal reads and is assigned like a number.
-* Results go into arrays of the caller, or are returned as numbers or a tuple of numbers. Nothing is
-  allocated: scratch memory is an argument too.
-* ``x[:] = ...``, ``x[3:6] += ...`` and ``A[i, :] = ...`` with ``+ - * /``, ``R @ v``, ``R.T``,
-  ``cross(a, b)``, and functions of numbers, which apply to each element. Sums of ``@`` go from the
-  first product to the last. Outside such statements ``a @ b`` of two vectors is a number.
-* It calls other kernels, ``math``, and NumPy's functions in the form that writes into a given
-  array, with the array passed by position: ``np.subtract(a, b, out)``. It uses no lists, dicts,
-  strings or comprehensions. A member of an ``IntEnum`` stands for its number.
+* Arguments are arrays, floats, ints, bools, signals, and named tuples of these; no other objects. An
+  argument says its type; ``Array1D`` and ``Array2D`` say how many dimensions there are. A scalar field
+  of a signal reads and is assigned like a number.
+* Results go into arrays of the caller, or are returned as numbers or a tuple of numbers. An array of
+  the kernel's own has a constant size: ``np.zeros(3)``; other scratch memory is an argument.
+* ``x[:] = ...``, ``x[::2] += ...`` and ``A[i, :] = ...`` with ``+ - * /``, ``R @ v``, ``R.T``,
+  ``cross(a, b)``, NumPy's functions, and functions of numbers, which apply to each element. Sums go
+  from the first to the last. ``a @ b`` of two vectors, ``np.sum(a)`` and the like are numbers.
+* Loops go over ``range``, arrays, ``enumerate`` and ``zip``. It calls other kernels and ``math``. It uses no
+  lists, dicts, strings or comprehensions. A member of an ``IntEnum`` stands for its number.
 * It raises no errors, reads no globals except constants, and is deterministic.
 """
 

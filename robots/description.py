@@ -171,7 +171,10 @@ def read(path: Path) -> ReadRobot:
         raise RobotError(str(path), [description_error])
     if path.suffix in MODEL_FILES:
         beside = next((p for s in YAML_FILES if (p := path.with_suffix(s)).is_file()), None)
-        return _read_model(path, beside, LocatedYaml.read(beside) if beside else None)
+        beside_text = LocatedYaml.read(beside) if beside else None
+        if beside and beside_text and _is_graph(beside_text.data):
+            raise _graph_beside(path, beside)
+        return _read_model(path, beside, beside_text)
     text = LocatedYaml.read(path)
     if isinstance(text.data, dict) and "file" in text.data:
         return _read_model(_named_file(path, text), path, text)
@@ -184,6 +187,23 @@ def read(path: Path) -> ReadRobot:
         )
     robot = _with_locations(RobotDescription.model_validate(data), path.parent)
     return ReadRobot(robot, path, notes=wrong_size(robot))
+
+
+def _is_graph(data: object) -> bool:
+    """Check whether a YAML is a graph, by keys that no robot's YAML has."""
+    return isinstance(data, dict) and "blocks" in data and ("rate" in data or "robot" in data)
+
+
+def _graph_beside(path: Path, graph: Path) -> RobotError:
+    """Return the error of a robot's file that has a graph beside it where its own YAML is looked for."""
+    message = (
+        f"{graph.name} beside {path.name} is a graph, and its name is that of the robot's own YAML"
+    )
+    description_error = DescriptionError(
+        (), message, f"a graph of another name than {path.stem}", graph.name,
+        f"rename the graph, such as to run_{graph.name}", 1, 1,
+    )  # fmt: skip
+    return RobotError(str(graph), [description_error])
 
 
 def _named_file(path: Path, text: LocatedYaml) -> Path:

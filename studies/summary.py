@@ -206,9 +206,12 @@ def write_table(path: Path, table: pyarrow.Table) -> None:
     """Write the table. After a failure there is no half-written file. Raises ``AloftError``."""
     from pyarrow import parquet
 
+    from ..logs.exporting.export import with_statistics
+
     partial = path.with_name(f".{path.name}.partial")
     try:
-        parquet.write_table(table, partial, compression="zstd")
+        statistics = with_statistics(table.schema)
+        parquet.write_table(table, partial, compression="zstd", write_statistics=statistics)
         partial.replace(path)
     except OSError as error:
         raise AloftError(f"cannot write {path}: {error.strerror or error}") from error

@@ -10,7 +10,7 @@ from aloft.blocks.scoring.estimator_score import EstimatorRecord
 from aloft.blocks.scoring.footing import Footing
 from aloft.blocks.scoring.jump_criteria import JumpRecord, JumpSeries
 from aloft.blocks.signals import PhaseState, RobotTruth, WholeBodyCommand
-from aloft.hal.simulated import plant
+from aloft.hal.simulated import external_forces
 from aloft.mathematics import elementwise
 from aloft.mathematics.body_dynamics import BodyMotion, body_motion, composite_inertias
 from aloft.mathematics.compiling.arguments import record_type
@@ -336,9 +336,9 @@ UNUSED = {
     "aloft.hal.simulated.base.report_fixed": (BASE,),
     "aloft.hal.simulated.base.report_planar": (POSE[0], POSE[3], BASE),
     "aloft.hal.simulated.base.read_pitch_rate": (POSE[0], np.zeros(3)),
-    "aloft.hal.simulated.plant.apply_push": (
+    "aloft.hal.simulated.external_forces.apply_push": (
         np.array([3.0, -2.0, 1.0]), np.array(1),
-        plant.PushPoints(
+        external_forces.PushPoints(
             np.array([2, 0]), np.array([1, 1]), DRAW((3, 3)), DRAW((2, 3)), np.zeros((2, 6)),
             np.zeros(1, np.bool_),
         ),

@@ -59,8 +59,8 @@ def test_the_controller_is_fused_and_gives_the_same_bytes_in_python(folder: Path
         ("step(e: Error, ", "step(w, e: Error, ", "which is no port or state of it; there is e"),
         (
             "x.before[:] = e.value\n",
-            "a = e.value + x.before\n",
-            "this makes a new array: assign it",
+            "x.before[:] = x.before[::-1]\n",
+            "is written while another part of it is read",
         ),
         ("x.before[:] = e.value\n", "x.before[:] = e.values\n", "Error has no field 'values'; it"),
     ],

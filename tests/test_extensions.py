@@ -128,7 +128,10 @@ def test_what_a_declaration_names_is_there() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("verb = {}", "unknown key 'verb'; there is summary, page, extras, needs, verbs, provides"),
+        (
+            "verb = {}",
+            "unknown key 'verb'; there is summary, page, extras, needs, verbs, help, provides",
+        ),
         ("extras = 'x'", "extras: expected a list of texts, found 'x'"),
         ("verbs = {a = 1}", "verbs: expected a table of texts, found {'a': 1}"),
         ("summary", "extension.toml: "),

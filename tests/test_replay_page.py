@@ -61,7 +61,7 @@ def test_another_parameter(output: Output) -> None:
 
 @pytest.mark.long
 def test_a_stretch_becomes_a_test(output: Output) -> None:
-    printed = output("aloft test --from recordings/jump.rrd --block landing --ticks 1200:1400")
+    printed = output("aloft test --recording recordings/jump.rrd --block landing --ticks 1200:1400")
     assert printed == sample("tests/test_landing")
 
 

@@ -55,7 +55,7 @@ blocks:
 """
 LOOKING: dict[str, list[str]] = {
     "graph": ["graph", "R"],
-    "view": ["view", "R", "--save", "OUT/seen.rrd", "--no-show"],
+    "view": ["view", "R", "--out", "OUT/seen.rrd", "--no-show"],
     "plot": ["plot", "R", "source.y.value"],
     "render": ["render", "R", "-o", "OUT/seen.png", "--at", "0.1"],
     "explain": ["explain", "R"],

@@ -69,8 +69,8 @@ class SafetyMonitor(Block):
     gain ``damping``; all values are finite whatever the inputs are. Every tick is judged, also
     after a fault. Limits and damping are given by joint name or pattern; by default they follow
     from the robot's motors. A fault of the hardware ends the run, with the drive and the value that
-    was measured as its reason. After any other fault the run goes on, damped: the score ends it. The
-    block does not watch deadlines.
+    was measured as its reason. After any other fault the run goes on, damped: the score ends it, and
+    without one it is no success. The block does not watch deadlines.
     """
 
     Params = SafetyParams
@@ -185,9 +185,13 @@ class SafetyMonitor(Block):
             period = self.context.clock.base_period
             result["safety_fault_time_s"] = int(self.state.fault_tick) * period
             result["safety_reason"] = self._reason(fault)
+            reason = f"{self.context.path}: {self._reason(fault)}"
             if is_of_hardware(fault):
                 result["success"] = False
-                result["reason"] = f"{self.context.path}: {self._reason(fault)}"
+                result["reason"] = reason
+            else:
+                time = int(self.state.fault_tick) * period
+                result["veto"] = f"{reason}; the robot was damped from {time:.6g} s on"
         return result
 
     def _reason(self, fault: SafetyFault) -> str:

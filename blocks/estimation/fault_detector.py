@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from enum import IntEnum
 
 import numpy as np
 
@@ -14,8 +13,7 @@ from ...mathematics.linear_algebra import product, solve_positive
 from ...robots.description import RobotDescription
 from ...robots.limb import leg_joints
 from ...runtime.language.block import Block, Clock, Input, Metric, State
-from ...runtime.language.parameters import Parameters, parameter
-from ...runtime.language.signals import Field, Signal
+from ...runtime.language.parameters import Parameters
 from ..signals import (
     ContactState,
     ContactSwitches,
@@ -27,126 +25,29 @@ from ..signals import (
     Phase,
     PhaseState,
 )
+from .fault_detector_state import (
+    FaultDetectorConstants,
+    FaultDetectorParams,
+    FaultDetectorScratch,
+    FaultDetectorState,
+    Stop,
+    Suspect,
+)
+from .gross_errors import (
+    find_gross_gravity,
+    find_gross_rate,
+    gravity_looks_like,
+    looks_like,
+    vector_text,
+)
 from .leg_forces import force_along, solve_leg
 
+_FAST = 5.0
+"""How much larger ``gross_rate`` is in the thrust."""
 _SLIGHT = 0.05
 """The share of a joint's peak torque that is added to its commanded torque."""
 _SPREAD = 0.05
 """Points whose three moments of inertia, as shares of half their sum, have a smaller product are in a line, or nearly."""
-
-
-class Suspect(IntEnum):
-    """The sensor or motor that disagrees with all the rest."""
-
-    NONE = 0
-    GYROSCOPE = 1
-    """It turns otherwise than the base over the feet that stand."""
-    ACCELEROMETER = 2
-    """Its direction is not that of the force with which the legs push."""
-    TORQUE = 3
-    """A joint's torque is off its command."""
-    ENCODER = 4
-    """A joint's angle changes otherwise than its speed implies."""
-    SWITCHES = 5
-    """None is closed under feet that carry the robot."""
-
-
-class FaultDetectorParams(Parameters):
-    """The parameters of ``FaultDetector``."""
-
-    window: float = parameter(
-        0.2, unit="s", gt=0.0, text="time constant in which a disagreement is forgotten"
-    )
-    force_window: float = parameter(0.4, unit="s", gt=0.0, text="the same of forces")
-    lateness: float = parameter(
-        0.004, unit="s", ge=0.0, text="largest delay of one measurement behind the other"
-    )
-    gyroscope_error: float = parameter(
-        0.08, unit="rad/s", ge=0.0, text="its largest steady error; zero: not judged"
-    )
-    acceleration_error: float = parameter(
-        0.05, ge=0.0, text="largest error of the accelerometer across the weight, in g; zero: not judged",
-    )  # fmt: skip
-    torque_error: float = parameter(
-        0.15,
-        ge=0.0,
-        text="share by which a joint's torque may be off its command; zero: not judged",
-    )
-    encoder_error: float = parameter(
-        0.1, unit="rad/s", ge=0.0,
-        text="largest steady difference of an angle's change and the speed; zero: not judged",
-    )  # fmt: skip
-    open_time: float = parameter(
-        0.15, unit="s", ge=0.0,
-        text="time for which all switches may be open under load; zero: not judged",
-    )  # fmt: skip
-    open_load: float = parameter(
-        0.5, gt=0.0, text="from which load on the feet on, in weights of the robot"
-    )
-    slip_speed: float = parameter(
-        0.1, unit="m/s", gt=0.0, text="of points that stand against each other; faster ones slide"
-    )
-    settle_time: float = parameter(
-        0.03, unit="s", ge=0.0, text="for which points have stood before they count"
-    )
-    rest_speed: float = parameter(
-        1.0, unit="rad/s", gt=0.0, text="mean speed of joints below which forces are those of rest"
-    )
-
-
-class FaultDetectorState(Signal):
-    """The state of ``FaultDetector``."""
-
-    suspect = Field(dtype="int64", values=Suspect, text="the first that was found")
-    tick = Field(dtype="int64", text="when")
-    place = Field(dtype="int64", text="its axis or joint")
-    value = Field(text="its disagreement")
-    share = Field(6, text="largest disagreement so far of each suspect, as a share of its limit")
-    started = Field(dtype="bool", text="there was a last tick")
-    standing = Field(dtype="int64", text="ticks in a row in which the points stood")
-    turn = Field(3, unit="rad", text="turn by the gyroscope less turn over the feet")
-    rate = Field(3, unit="rad/s", text="the gyroscope's mean")
-    slip = Field("n_joints", unit="rad", text="change of the angle less integral of the speed")
-    speed = Field("n_joints", unit="rad/s", text="mean speed of each joint")
-    position = Field("n_joints", unit="rad", text="angles of the last tick")
-    expected = Field("n_joints", unit="N m", text="torques that the last command asks for")
-    level = Field("n_joints", unit="N m", text="their mean")
-    asked = Field("n_joints", unit="N m", text="the mean of their magnitudes")
-    missing = Field("n_joints", unit="N m", text="mean of measured torques less expected ones")
-    lacking = Field(3, unit="N", frame="body", text="mean force that the legs lack")
-    open = Field(dtype="int64", text="ticks in a row with load and no switch closed")
-
-
-class FaultDetectorConstants(Signal):
-    """Constants of the robot's description and the parameters."""
-
-    foot_of_point = Field("n_contacts", dtype="int64", text="the foot of each contact point")
-    leg_joints = Field(
-        ("n_feet", "n_leg_joints"), dtype="int64", text="joints of each foot's leg, then -1"
-    )
-    peak = Field("n_joints", unit="N m", text="the motors' peak torques at the joints")
-    weight = Field(unit="N", text="of the robot")
-    fading = Field(2, text="share of a mean that goes in a tick: of all, of forces")
-    settling = Field(dtype="int64", text="ticks for which points have stood before they count")
-    open_ticks = Field(dtype="int64", text="ticks with load and open switches that are no fault")
-
-
-class FaultDetectorScratch(Signal):
-    """Intermediate values of a tick."""
-
-    stands = Field("n_contacts", dtype="bool", text="points that stand")
-    arm = Field(("n_contacts", 3), unit="m", text="points from their mean, world axes")
-    moved = Field(("n_contacts", 3), unit="m/s", text="their velocities against the base's")
-    mean = Field((2, 3), text="of the points and their velocities")
-    inertia = Field((3, 3), unit="m^2", text="of the points, as unit masses, about their mean")
-    turning = Field(
-        (2, 3), unit="rad/s", text="the base's rate over its feet, in world and base axes"
-    )
-    force = Field(3, unit="N", text="force of a contact point, world axes")
-    needed = Field("n_joints", unit="N m", text="torques that the ground gives")
-    normal = Field(("n_leg_joints", "n_leg_joints"), text="J' J of a leg, damped")
-    solution = Field("n_leg_joints", text="y of a leg")
-    lacking = Field(3, unit="N", frame="body", text="force that the legs lack now")
 
 
 class FaultDetector(Block):
@@ -174,7 +75,18 @@ class FaultDetector(Block):
     * **Switches.** By the legs' torques the feet carry more than ``open_load`` weights, and no switch is closed
       for ``open_time``. One foot across an edge may stand so, and does not count.
 
-    It only warns, for a robot often survives what is found, and damping would make it fall. The first suspect is kept in the state, in
+    It only warns, for a robot often survives what is found, and damping would make it fall. **Before lift-off** it ends the run, which puts the
+    robot in damping, where a driver's unit or sign is wrong, or a sensor gives nonsense: with such an IMU a robot falls within 0.2 s.
+
+    * An axis of the gyroscope differs by more than ``gross_rate`` from the base's rate over its feet; in the thrust, where rates change by
+      350 rad/s in a second and either may be late, by five times as much.
+    * In the stand, while joints are slow, the accelerometer differs by more than ``gross_gravity`` from 1 g away from the plane of the points that
+      carry the robot. Neither the estimated attitude nor the switches are in it; the slope of the ground is, so it is a coarse check.
+
+    The first must last for ``lateness`` and ``gross_time``, the second for ``gross_time``. The sign of the accelerometer's x and y cannot be seen in an upright stand: turn the robot by hand
+    (``aloft bring-up`` asks for it).
+
+    The first suspect is kept in the state, in
     the metrics ``suspect`` and ``suspect_time_s`` and in the result's warnings. ``SafetyMonitor`` judges what must end a run.
     ``largest_disagreement`` is how near a run came to a warning, as a share of the limit.
 
@@ -218,6 +130,9 @@ class FaultDetector(Block):
         constants.fading[:] = min(1.0, period / p.window), min(1.0, period / p.force_window)
         constants.settling = round(p.settle_time / period)
         constants.open_ticks = round(p.open_time / period)
+        constants.gross_ticks[:] = (
+            round((p.lateness + p.gross_time) / period), round(p.gross_time / period),
+        )  # fmt: skip
 
     @kernel
     @staticmethod
@@ -237,15 +152,19 @@ class FaultDetector(Block):
         clock: Clock,
         period: float,
     ) -> bool:
-        before = state.suspect
+        before, stopped = state.suspect, state.stop != Stop.NONE
         compare_encoders(joints, state, params, constants, period)
         find_standing(contacts, switches, phase, scratch)
         rigid = turn_over_feet(joints, terms, params.slip_speed, scratch)
+        on_the_ground = phase.phase >= Phase.STAND and phase.phase <= Phase.THRUST
+        if state.stop == Stop.NONE:
+            most = params.gross_rate * (_FAST if phase.phase == Phase.THRUST else 1.0)
+            find_gross_rate(on_the_ground and rigid, most, imu, state, constants, scratch)
+            find_gross_gravity(imu, joints, terms, phase, state, params, constants, scratch)
         state.standing = state.standing + 1 if rigid else 0
         stands = state.standing > constants.settling
         compare_gyroscope(stands, imu, state, params, constants, scratch, period)
         rests = stands and is_slow(state, params.rest_speed)
-        on_the_ground = phase.phase >= Phase.STAND and phase.phase <= Phase.THRUST
         compare_torques(rests or on_the_ground, joints, state, params, constants)
         expected_torques(
             command.torque, command.stiffness, command.damping, command.position, command.velocity,
@@ -258,10 +177,15 @@ class FaultDetector(Block):
             state.lacking[:] = 0.0
         compare_switches(load, switches, state, params, constants)
         state.started = True
-        begins: bool = before == Suspect.NONE and state.suspect != Suspect.NONE
-        if begins:
+        if before == Suspect.NONE and state.suspect != Suspect.NONE:
             state.tick = clock.tick
-        return begins
+        ends: bool = not stopped and state.stop != Stop.NONE
+        if ends:
+            state.stop_tick = clock.tick
+        return ends
+
+    def on_event(self) -> None:
+        self.request_stop(self._stop_reason())
 
     def metrics(self) -> Mapping[str, Metric]:
         """Return the first suspect, and how near the run came to one."""
@@ -270,6 +194,11 @@ class FaultDetector(Block):
         if state.suspect != Suspect.NONE:
             result["suspect"] = Suspect(int(state.suspect)).name.lower()
             result["suspect_time_s"] = self._time()
+        if self.state.stop != Stop.NONE:
+            result["stopped_for"] = Stop(int(self.state.stop)).name.lower()
+            result["stopped_time_s"] = int(self.state.stop_tick) * self.context.clock.base_period
+            result["success"] = False
+            result["reason"] = f"{self.context.path}: {self._stop_reason()}"
         return result
 
     def warnings(self) -> Sequence[str]:
@@ -280,6 +209,22 @@ class FaultDetector(Block):
 
     def _time(self) -> float:
         return int(self.state.tick) * self.context.clock.base_period
+
+    def _stop_reason(self) -> str:
+        """Describe in words what ended the run: what was read, what is right, and what that looks like."""
+        state, p = self.state, self.params
+        read, right = state.reading.copy(), state.right.copy()
+        if state.stop == Stop.GYROSCOPE:
+            axis = int(np.argmax(np.abs(read - right)))
+            return (
+                f"the gyroscope's axis {'xyz'[axis]} reads {read[axis]:+.2f} rad/s while the base turns over its feet by "
+                f"{right[axis]:+.2f}{looks_like(read[axis], right[axis])}; correct the driver or the IMU's mounting "
+                f"(gross_rate is {p.gross_rate:g} rad/s)"
+            )
+        return (
+            f"the accelerometer reads {vector_text(read)} m/s^2 at rest, where the legs say {vector_text(right)}"
+            f"{gravity_looks_like(read, right)}; correct the driver or the IMU's mounting (gross_gravity is {p.gross_gravity:g} g)"
+        )
 
     def _reason(self) -> str:
         """Describe the suspect in words, by its measured value and its limit."""

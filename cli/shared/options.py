@@ -15,6 +15,7 @@ a data class whose fields are declared as options are::
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import fields, is_dataclass
 from functools import wraps
 from inspect import Parameter, Signature, signature
@@ -55,14 +56,16 @@ def block_names(incomplete: str) -> list[str]:
 def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
     """List the parameters, as ``block.parameter=``, of the graph on the command line that begin
     with a text."""
+    from ...logs.file.code import code_of, is_trusted
     from ...runtime.language.importing import without_imports
     from ...runtime.language.parameters import declared_fields
-    from ...runtime.loading import LoadError, checked_file
+    from ...runtime.loading import LoadError, checked_file, flatten
 
     # Arguments in front of an option that still waits for its value are not parsed yet.
     given = context.params.get("graph") or next(iter(context.args), "")
     try:
-        with without_imports():  # a key that is pressed runs no code
+        known = all(map(is_trusted, code_of(flatten(str(given)))))
+        with nullcontext() if known else without_imports():  # a key runs no code that never ran
             graph = checked_file(str(given))
     except LoadError:
         return []  # no graph yet, or one that may not run: nothing to offer
@@ -77,7 +80,7 @@ def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 JsonBesideTables = Annotated[
-    bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
+    bool, typer.Option("--json", help="Print one JSON object on stdout (tables go to stderr).")
 ]
 GraphFolder = Annotated[
     Path | None,
@@ -90,7 +93,7 @@ Trust = Annotated[
         help="Run the code that the recording names and that is not aloft's; remembered for its content.",
     ),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Only print pass or fail.")]
 NoRecord = Annotated[bool, typer.Option("--no-record", help="Write no recording.")]
 Overrides = Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)]
 CompletedOverrides = Annotated[

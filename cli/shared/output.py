@@ -119,7 +119,7 @@ def errors_reported(as_json: bool, *, traceback: bool = False) -> Iterator[None]
             console(to_stderr=True).print(error.report.rich(), soft_wrap=True)
         raise typer.Exit(ExitCode.BAD_INPUT) from error
     except AloftError as error:
-        code = ExitCode.RUN_FAILED if isinstance(error, RunError) else ExitCode.BAD_INPUT
+        code = error.exit_code if isinstance(error, RunError) else ExitCode.BAD_INPUT
         if as_json:
             details = error.to_json() if isinstance(error, RunError) else {}
             print_json({"success": False, "reason": str(error), **details})

@@ -68,6 +68,7 @@ class OneRunOptions:
         split: the time of the graph after which a new recording begins [s]; zero: never.
         as_json: whether one JSON object is printed.
         times: whether the times of blocks are printed.
+        verbose: whether all metrics and the times of blocks are printed.
         traceback: whether the whole traceback of a block that fails is printed.
         plain: whether nothing is compiled.
         fuse: whether blocks of kernels that follow each other are one call.
@@ -79,6 +80,7 @@ class OneRunOptions:
     split: float = 0.0
     as_json: bool = False
     times: bool = True
+    verbose: bool = False
     traceback: bool = False
     plain: bool = False
     fuse: bool = True
@@ -137,7 +139,7 @@ def run_once(
     files = [str(file) for file in recorder.files] if recorder is not None else []
     return report_run(
         out, graph.checked, result, as_json=as_json, traceback=options.traceback,
-        times=options.times, recording=recording, missing=missing, about_files=about_files,
+        times=options.times, verbose=options.verbose, recording=recording, missing=missing, about_files=about_files,
         problem=problem, first=also or {},
         last={"warnings": [*messages, *result.warnings], "files": files, **graph.about()},
     )  # fmt: skip
@@ -153,6 +155,7 @@ def report_run(
     recording: Path | None,
     problem: str,
     times: bool = True,
+    verbose: bool = True,
     tables: Sequence[Table] = (),
     missing: str = "",
     about_files: Sequence[str] = (),
@@ -166,6 +169,7 @@ def report_run(
         recording: where the recording is, if there is one.
         problem: what of the recording is missing, as an error; empty if nothing is.
         times: whether the times of the blocks are printed.
+        verbose: whether these and all metrics are printed.
         tables: printed behind the metrics.
         missing: behind the path of the recording.
         about_files: lines behind that.
@@ -179,7 +183,7 @@ def report_run(
     from .viewing import how_to_view
 
     code = code_with_recording(result.exit_code, problem)
-    print_result(out, graph.name, result, times=times)
+    print_result(out, graph.name, result, times=times, verbose=verbose)
     for each in tables:
         out.print(each)
     if recording is not None:
@@ -270,17 +274,28 @@ def print_rows(out: Console, rows: list[SeedRow]) -> None:
     )
 
 
-def print_result(out: Console, name: str, result: RunResult, *, times: bool = True) -> None:
-    """Print the metrics and the times of a run."""
+FIRST_METRICS = 6
+"""Metrics that are printed without --verbose, of those that are not zero; those of blocks that judge the
+run come first."""
+
+
+def print_result(
+    out: Console, name: str, result: RunResult, *, times: bool = True, verbose: bool = True
+) -> None:
+    """Print the metrics and the times of a run; the first few metrics only, unless ``verbose``."""
     metrics = [(key, number(value)) for key, value in result.metrics.items()]
     if metrics:
-        out.print(table(f"{name}: metrics", ("metric", ">value"), metrics))
+        nonzero = [(key, number(value)) for key, value in result.metrics.items() if value]
+        shown = metrics if verbose else nonzero[:FIRST_METRICS]
+        out.print(table(f"{name}: metrics", ("metric", ">value"), shown))
+        if left := len(metrics) - len(shown):
+            say(out, f"{left} more metrics, and the times of blocks: --verbose")
     rows = [
         (path, str(t.calls), f"{t.p50_us:.1f}", f"{t.p99_us:.1f}", f"{t.max_us:.1f}")
         for path, t in result.blocks.items()
     ]
     columns = ("block", ">runs", ">median [us]", ">99 % [us]", ">longest [us]")
-    if times:
+    if times and verbose:
         out.print(table(f"{name}: time a run of each block takes", columns, rows))
     speed = result.duration_s / result.wall_time_s if result.wall_time_s else 0.0
     say(

@@ -94,7 +94,7 @@ class BearRobot(DrivenRobot):
                 f"in virtual time nothing guards the drives at {hardware.bus.port}: only a twin may be "
                 "armed so",
                 parameter="time",
-                expected="real, or the file that `aloft twin --virtual --write` writes",
+                expected="real, or the file that `aloft twin --virtual --out` writes",
                 found="virtual",
             )
         ratio = context.period / hardware.bus.period
@@ -226,9 +226,7 @@ class BearRobot(DrivenRobot):
         if self._watchdog is not None:
             self._watchdog.close()
         self._switch.close()
-        if self.driver is not None:
-            self.waits_for_others = True  # no hang: it has a limit of its own
-            self.driver.close()
+        DrivenRobot.close(self)
 
     def _stop_reason(self) -> str:
         """Return the reason why the motor thread must not go on; empty if it may."""

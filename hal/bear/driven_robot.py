@@ -78,6 +78,12 @@ class DrivenRobot(Robot):
     def report(self) -> None:
         """Nothing more: ``read`` does it, so that the readings and their ages are of one exchange."""
 
+    def close(self) -> None:
+        """Let the windings cool, and give the ports back."""
+        if self.driver is not None:
+            self.waits_for_others = True  # no hang: it has a limit of its own, `board.cool_down`
+            self.driver.close()
+
     @abstractmethod
     def now(self) -> float:
         """Return the time since the driver was opened [s]."""

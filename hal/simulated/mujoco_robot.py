@@ -54,7 +54,8 @@ class MujocoRobot(SimulatedRobot):
     that follow from its weight and inertia (``stance.py``), settles for 0.3 s, and is centred: the
     middle between the soles is the world's origin. It is held so until the first command arrives.
     Joints without a working motor are kept in the standing pose until the run begins. A fixed base
-    is at the world's origin from the start, and a robot without feet lies on its lowest shape.
+    is at the world's origin from the start, and a robot without feet lies on its lowest shape. One that does not stay
+    there begins from rest as it was put down, and so does any robot with ``start.stand: false``.
 
     For a joint that slides, metres and newtons stand for radians and newton metres in every parameter
     and signal.
@@ -142,7 +143,8 @@ class MujocoRobot(SimulatedRobot):
             )
         elif params.actuators.bus_period is not None:
             yield from gain_requirements(params, robot)
-        uneven = uneven_contacts(robot) if robot.base_joint != "fixed" else ""
+        stands = robot.base_joint != "fixed" and params.start.stand
+        uneven = uneven_contacts(robot) if stands else ""
         if uneven:
             yield UnmetRequirement(
                 uneven,

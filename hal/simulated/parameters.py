@@ -49,6 +49,11 @@ class StartParameters(Parameters):
     random_start_phase: bool = parameter(
         False, text="start physics at a drawn phase of the control clock"
     )
+    stand: bool = parameter(
+        True,
+        text="whether a robot with feet, or on a fixed base, must stay as it starts; if not, it is put down in its standing "
+        "pose, begins from rest and falls if it falls, as one without feet does",
+    )
     gantry: GantryParameters | None = parameter(
         None, text="a gantry in which the robot hangs at the start; none: it stands"
     )
@@ -231,6 +236,11 @@ class SimulatorParameters(DriveGains, WorldParameters):
         text="that of noise, jitter, and the attitude and clock at the start, for another run of the "
         "robot that `seed` draws; none: as `seed`",
     )  # fmt: skip
+    flight_integrator: Literal["implicitfast", "RK4"] = parameter(
+        "implicitfast",
+        text="integration of physics steps that begin without any contact: in one stage, or in the four of Runge and Kutta, "
+        "which conserve momentum",
+    )
     timestep: float = parameter(
         0.0005, unit="s", gt=0, le=0.002, text="physics step; it must divide the control period"
     )

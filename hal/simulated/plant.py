@@ -39,7 +39,7 @@ from .external_forces import ExternalForces
 from .gantry import Gantry
 from .mujoco_model import body_name, build_world, number_of_soles
 from .parameters import SimulatorParameters
-from .physics_step import step_calls
+from .physics_step import flight_step_calls, step_calls
 from .sensors import SimulatedSensors
 from .stance import (
     StartCheck,
@@ -47,6 +47,7 @@ from .stance import (
     holding_gains,
     holding_torque,
     passive_joints,
+    put_down,
     set_standing_pose,
 )
 from .state import (
@@ -204,6 +205,9 @@ class Plant:
             read_encoders, views.angle, self.sensors.encoder_offset, self._encoder
         )
         self.step1, self.step2 = step_calls(model, data)
+        self._advance: list[Call] = [self.step2]
+        if self._params.flight_integrator == "RK4":
+            self._advance = flight_step_calls(model, data, self.step2)
         if self._params.ground.contact_bias:
             self.step1 = ForeignCall(ContactBias(model, data).begin_step, 0)
         self.forces = ExternalForces(model, data, self._robot)
@@ -242,7 +246,11 @@ class Plant:
             bool(self.variation.link_length),
         )
         normal = self._params.build_scene(robot).normal(0.0, 0.0)
-        set_standing_pose(model, data, base, robot, tilt, level, normal)
+        if params.start.stand:
+            set_standing_pose(model, data, base, robot, tilt, level, normal)
+        else:
+            put_down(model, data, base, robot, tilt)
+        placed = data.qpos.copy()
         if self.gantry is not None and params.start.gantry is not None:
             base.shift(np.array([0.0, 0.0, params.start.gantry.height]))
             mujoco.mj_kinematics(model, data)
@@ -264,7 +272,12 @@ class Plant:
         self.clear_record()
         self._settle(step, observed)
         load = self.record.load[:, 3] / -observed
-        StartCheck(model, data, base, robot, hangs).check(load, pose, torque, rotation)
+        check = StartCheck(model, data, base, robot, hangs)
+        if not params.start.stand or (check.may_fall and not check.stays(pose)):
+            data.qpos[:], data.qvel[:], data.qacc_warmstart[:] = placed, 0.0, 0.0
+            mujoco.mj_kinematics(model, data)
+        else:
+            check.check(load, pose, torque, rotation)
         if not hangs:
             centre_on_origin(data, base, robot)
         self.data.time = 0.0
@@ -318,7 +331,7 @@ class Plant:
             *([self.forces.release_call()] if added else []),
             *([] if push is None else [self.forces.push_call(push)]),
             *added,
-            self.step2, *self._motion_calls, self._record_call, *self.sensors.after_step_calls(),
+            *self._advance, *self._motion_calls, self._record_call, *self.sensors.after_step_calls(),
             *self._model_calls, self.step1, *self._reading_calls,
         ]  # fmt: skip
         return CallSequence([self.forces.release_call(), *(one * steps)])

@@ -67,7 +67,7 @@ def set_standing_pose(
     if base.velocities == 0:
         return
     if not robot.contacts:
-        _put_down(model, data, base, robot)
+        _lower(model, data, base, robot)
         return
     uneven = uneven_contacts(robot)
     if uneven:
@@ -238,9 +238,32 @@ def _leg_joints(robot: RobotDescription) -> NDArray[np.int64]:
     return np.flatnonzero(legs)
 
 
-def _put_down(model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription) -> None:
-    """Lower the robot until its lowest shape touches the ground."""
-    lowest = np.inf
+def put_down(
+    model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription, attitude: Array
+) -> None:
+    """Put the robot into its standing pose, with its base turned by the rotation vector ``attitude`` [rad, world], and
+    lower it until its lowest shape or contact point touches the ground, whether or not it stands so; a fixed base stays
+    where it is.
+
+    Raises:
+        StartError: there is nothing to put the robot down on.
+    """
+    import mujoco
+
+    data.qpos[base.positions :] = robot.standing_position
+    base.place()
+    if base.velocities:
+        base.turn(attitude)
+    mujoco.mj_kinematics(model, data)
+    if base.velocities:
+        _lower(model, data, base, robot)
+        mujoco.mj_kinematics(model, data)
+
+
+def _lower(model: MjModel, data: MjData, base: FixedBase, robot: RobotDescription) -> None:
+    """Lower the robot until its lowest shape or contact point touches the ground."""
+    places = [data.geom(contact.name).xpos.item(2) - contact.radius for contact in robot.contacts]
+    lowest = min(places, default=np.inf)
     for link in robot.links:
         for k, shape in enumerate(link.shapes):
             geom, form = data.geom(f"{link.name}/{k}"), model.geom(f"{link.name}/{k}")
@@ -330,7 +353,7 @@ class StartCheck:
     """Checks that a settled robot stands: its feet carry its weight, nothing else touches anything,
     nothing moves, and the base has the orientation asked for.
 
-    A robot on a fixed base, or without contact points, must only be still while it is held.
+    A robot on a fixed base must only be still while it is held; a free one without feet need not.
 
     Args:
         model, data: the simulator's model and data, after settling.
@@ -346,6 +369,12 @@ class StartCheck:
         self._model, self._data, self._base, self._robot = model, data, base, robot
         self._hangs = hangs
         self._standing = bool(robot.contacts) and base.velocities > 0 and not hangs
+        self.may_fall = not robot.contacts and base.velocities > 0 and not hangs
+        """True for a robot that nothing asks to stay as it starts: a free one without feet."""
+
+    def stays(self, wanted: Array) -> bool:
+        """Check whether the robot is still, its joints where they are held (``wanted``, as in ``check``)."""
+        return not self._sagging(wanted) and not self._moving()
 
     def check(self, load: Array, wanted: Array, torque: Array, rotation: Array) -> None:
         """Raise ``StartError`` if the robot does not stand.
@@ -370,7 +399,8 @@ class StartCheck:
         verb = "stand" if self._standing else "stay"
         raise StartError(
             f"{self._robot.name} does not {verb} as its description says when it is held in its "
-            f"standing pose for 0.3 s: {'; '.join(found)}"
+            f"standing pose for 0.3 s: {'; '.join(found)}; with `start: {{stand: false}}` it begins in that pose "
+            "and falls if it falls"
         )
 
     def _unbalanced(self) -> list[str]:

@@ -199,6 +199,7 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
         self._reporting = self.twin.plant.truth.report_calls(self.truth)
         self._hardware = hardware
         self.driver = _driver(robot, params, hardware, self.twin)
+        self.driver.waits_for_windings = False
         self._queue = CommandQueue(self.driver.loop, robot, params.latency, self.period)
         self._kept = ObjectSnapshot(_parts(self.twin, self.driver, self._queue))
 
@@ -244,11 +245,6 @@ class TwinRobot(SimulatedRobot, DrivenRobot):
         exchange()
         while twin.exchanges < end:
             twin.advance()
-
-    def close(self) -> None:
-        """Give the ports back."""
-        if self.driver is not None:
-            self.driver.close()
 
     def save_state(self) -> None:
         """Copy all that is kept elsewhere to the declared state."""

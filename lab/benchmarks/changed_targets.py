@@ -142,7 +142,7 @@ def run_changed(kind: str, seed: int, more: Mapping[str, Any] | None = None) -> 
     sets: dict[str, Any] = {"commands.commands": commands, "score.jumps": 1, "duration": 6.0}
     if kind == "height":
         sets["robot.ground.scene"] = two_levels(commands[-1]["ahead"], commands[-1]["up"])
-    return run_seed(seed, "steer.yaml", (SENSOR,), {**sets, **(more or {})})
+    return run_seed(seed, "aloft:hopping/steer", (SENSOR,), {**sets, **(more or {})})
 
 
 def two_levels(ahead: float, up: float) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...planner.library.library import shipped_folder
+from ...runtime.loading.reading.files import graph_path
 from ...studies.expansion import load_cell
 from ...studies.summary import wilson_interval
 from .rows import Row
@@ -64,7 +65,9 @@ def courses(seeds: Sequence[int] = SEEDS, robot: str = "bruce") -> list[Row]:
     """
     if robot == "bruce":
         return _rows([run_course(seed) for seed in seeds], MISSED_GOAL)
-    found = [run_course(seed, {"robot": robot}, graph="robots/steer.yaml") for seed in seeds]
+    found = [
+        run_course(seed, {"robot": robot}, graph="aloft:hopping/robots/steer") for seed in seeds
+    ]
     return _rows(found, OTHERS_MISSED_GOAL)
 
 
@@ -127,7 +130,7 @@ def fell(metrics: Mapping[str, Any]) -> bool:
 
 def run_course(
     seed: int, more: Mapping[str, Any] | None = None, behind: Sequence[str] = (SENSOR,),
-    graph: str = "steer.yaml",
+    graph: str = "aloft:hopping/steer",
 ) -> dict[str, Any]:  # fmt: skip
     """Run a course and return its metrics, with its ``seed``; ``more`` overrides what the graph
     says, and the files ``behind`` are included behind it."""
@@ -144,7 +147,7 @@ def run_seed(
     graphs = shipped_folder()
     seeds = {"robot.seed": seed, "capture.seed": seed} if sensor else {"robot.seed": seed}
     found = load_cell(
-        graphs / graph, [graphs / "trials/robust.yaml"],
+        graph_path(graph), [graphs / "trials/robust.yaml"],
         {**seeds, **sets}, graphs / "bench.yaml",
         [graphs / name for name in behind],
     ).run(log=False)  # fmt: skip

@@ -64,4 +64,4 @@ def run_hops(
     """Run a row of hops at these speeds and return its metrics; ``more`` overrides what the graph
     says."""
     sets = {"speed.twists": list(told), **(more or {})}
-    return run_seed(seed, "hop_on.yaml", (), sets, sensor=False)
+    return run_seed(seed, "aloft:hopping/hop_on", (), sets, sensor=False)

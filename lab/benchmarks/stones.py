@@ -72,7 +72,10 @@ def staircase(seeds: Sequence[int] = STAIRS_SEEDS) -> list[Row]:
 
 def go2_staircase(seeds: Sequence[int] = GO2_STAIRS_SEEDS) -> list[Row]:
     """Measure the same of Go2 on seven steps of 8 cm that hold all of its feet, each 50 cm deep."""
-    found = [run_seed(seed, "robots/go2_stairs.yaml", (), {"duration": LONGEST}) for seed in seeds]
+    found = [
+        run_seed(seed, "aloft:hopping/robots/go2_stairs", (), {"duration": LONGEST})
+        for seed in seeds
+    ]
     return _rows_of_stairs("Go2's staircase", found, GO2_STEPS, "8 cm")
 
 
@@ -94,7 +97,7 @@ def _rows_of_stairs(
 def run_staircase(seed: int) -> dict[str, Any]:
     """Run up the staircase and return the metrics, with the ``seed``."""
     sets = {"commands.stones": STAIRCASE, "commands.size": STEP, "duration": LONGEST}
-    return run_seed(seed, "steer_stones.yaml", (), sets)
+    return run_seed(seed, "aloft:hopping/steer_stones", (), sets)
 
 
 def passed(metrics: dict[str, Any], jumps: int = JUMPS) -> bool:
@@ -111,4 +114,4 @@ def run_stones(seed: int, height: float, sensor: bool) -> dict[str, Any]:
         "commands.random": {"count": JUMPS, "seed": seed, "height": height}, "duration": LONGEST,
         "capture.dropout": 0.0 if sensor else 1.0,
     }  # fmt: skip
-    return run_seed(seed, "steer_stones.yaml", (), sets)
+    return run_seed(seed, "aloft:hopping/steer_stones", (), sets)

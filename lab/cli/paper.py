@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+import subprocess
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 
 NAME = "paper"
+STANDS_TILT = 5.0
 STUDY = Path(__file__).parents[2] / "graphs" / "studies" / "paper.yaml"
 
 
@@ -61,7 +63,8 @@ def draw_paper(
     rows = summarise(found, done)
     write_table(kept / "runs.parquet", make_table(done))
     folder.mkdir(parents=True, exist_ok=True)
-    results = plain(draw(traces, rows, chosen, folder))
+    results = plain(draw(traces, rows, stands_by_task(done), chosen, folder))
+    results["commit"] = commit_of_code()
     text = json.dumps(results, indent=1, allow_nan=False) + "\n"
     (folder / "paper.json").write_text(text, encoding="utf-8")
     (folder / "paper.md").write_text(page(results), encoding="utf-8")
@@ -75,6 +78,25 @@ def draw_paper(
     if as_json:
         print_json({"success": not broken, "reason": f"{broken} runs broke", **results})
     return ExitCode.RUN_FAILED if broken else ExitCode.SUCCESS
+
+
+def stands_by_task(runs: Sequence[Run]) -> dict[str, int]:
+    """Return how many runs of each task stand at the end: no fall, and a tilt below 5 degrees. A run that was ended by a
+    fall has no final tilt."""
+    found: dict[str, int] = {}
+    for run in runs:
+        tilt = None if run.outcome is None else run.outcome.metrics.get("final_tilt_deg")
+        stands = isinstance(tilt, int | float) and tilt < STANDS_TILT
+        found[run.cell.task] = found.get(run.cell.task, 0) + stands
+    return found
+
+
+def commit_of_code() -> str:
+    """Return the commit of the checkout that runs; empty where there is none."""
+    found = subprocess.run(
+        ["git", "rev-parse", "HEAD"], cwd=STUDY.parent, capture_output=True, text=True, check=False
+    )
+    return found.stdout.strip()
 
 
 def traced(

@@ -167,10 +167,14 @@ def jump_numbers(trace: Trace) -> Mapping[str, float]:
     if flight is not None:
         pitch = np.degrees(pitch_and_roll(trace.truth("base_orientation"))[0])[flight]
         momentum = trace.truth("angular_momentum")[flight, 1]
+        planned = np.degrees(pitch_and_roll(trace.plan("orientation"))[0])[flight]
+        thrust = trace.truth("angular_momentum")[: flight.start, 1]
         squat = float(com[: flight.start].min())
         numbers |= {
             "com_squat_to_apex_cm": 100.0 * (float(com[flight].max()) - squat),
             "pitch_change_in_flight_deg": float(pitch[-1] - pitch[0]),
+            "planned_pitch_change_in_flight_deg": float(planned[-1] - planned[0]),
+            "k_y_at_most_in_thrust_nms": float(np.abs(thrust).max()),
             "k_y_in_flight_nms": float(momentum.mean()),
             "flight_s": float(np.diff(trace.flight_times or (0.0, 0.0))[0]),
         }
@@ -194,7 +198,8 @@ def draw_push(arms: Mapping[str, Sequence[Trace]]) -> Image:
             "are seen from the CoM, world axes."
         ),
         "; ".join(
-            f"{arm}: " + ", ".join("stood" if run.outcome.success else "fell" for run in found)
+            f"{arm}: "
+            + ", ".join("fell" if "fell" in run.outcome.reason else "stood" for run in found)
             for arm, found in arms.items()
         )
         + " (+x, +y of the seed shown)",

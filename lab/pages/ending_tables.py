@@ -61,10 +61,13 @@ def _fault_cell(runs: Sequence[Row]) -> str:
     for run in runs:
         reason = run["reason"]
         ends["succeed" if run["success"] else "fall" if reason.startswith("fell") else
-             "stop" if reason.startswith(("safety", "the run failed")) else "fail"] += 1  # fmt: skip
+             "stop" if reason.startswith(("safety", "detector", "the run failed")) else "fail"] += 1  # fmt: skip
         if run.get("safety_fault_time_s") is not None and run.get("fault_time_s") is not None:
             after = run["safety_fault_time_s"] - run["fault_time_s"]
             stops.setdefault(run["safety_fault"].replace("_", " "), []).append(after)
+        if run.get("stopped_time_s") is not None and run.get("fault_time_s") is not None:
+            after = run["stopped_time_s"] - run["fault_time_s"]
+            stops.setdefault(run["stopped_for"], []).append(after)
         if run.get("suspect_time_s") is not None and run.get("fault_time_s") is not None:
             after = run["suspect_time_s"] - run["fault_time_s"]
             warned.setdefault(run["suspect"], []).append(after)

@@ -38,6 +38,7 @@ from result_tables import (
     ratio_table,
     real_table,
     results_table,
+    robot_files_table,
     table,
     tasks_table,
     tick_tables,
@@ -126,6 +127,15 @@ def write_faults(file: Path) -> None:
     refresh(
         DOCS.parent / "extensions" / "analysis" / "analysis.md",
         "faults",
+        fault_table(_runs_of([file])),
+    )
+
+
+def write_wrong_imu(file: Path) -> None:
+    """Write the effects of an IMU with wrong units and signs, by the time of their onset."""
+    refresh(
+        DOCS.parent / "extensions" / "analysis" / "analysis.md",
+        "wrong_imu",
         fault_table(_runs_of([file])),
     )
 
@@ -264,6 +274,11 @@ def write_robots_results(file: Path) -> None:
     refresh(DOCS / "robots_results.md", "tasks", tasks_table(read_json(file)))
 
 
+def write_robot_files(file: Path) -> None:
+    """Write every robot file of dm_control, Gymnasium and example-robot-data, compared with other readings of it."""
+    refresh(DOCS / "robots.md", "robot files", robot_files_table(read_json(file)["rows"]))
+
+
 def write_every_robot(file: Path) -> None:
     """Write every URDF of example-robot-data, read and put on its feet."""
     refresh(DOCS / "robots_results.md", "every robot", every_robot_table(read_json(file)["rows"]))
@@ -360,15 +375,21 @@ class Page(NamedTuple):
 STUDIES = "aloft study graphs/studies/"
 PAGES = {
     "agreement": Page(write_agreement, "aloft bench agreement --json > FILE", "FILE"),
-    "comparisons": Page(write_comparisons, f"{STUDIES}controller.yaml", "results/controller ..."),
+    "comparisons": Page(
+        write_comparisons, f"{STUDIES}formulations.yaml", "results/formulations ..."
+    ),
     "effects": Page(write_effects, f"{STUDIES}effects.yaml", "results/effects/summary.json"),
     "every_robot": Page(write_every_robot, "aloft bench every_robot --json > FILE", "FILE"),
+    "robot_files": Page(write_robot_files, "aloft bench robot_files --json > FILE", "FILE"),
     "mutated_robots": Page(
         write_mutated_robots, "aloft bench mutated_robots --json > FILE", "FILE"
     ),
     "excerpts": Page(write_excerpts),
     "export": Page(write_export, "aloft bench export --tsid FOLDER --json > FILE", "FILE"),
     "faults": Page(write_faults, f"{STUDIES}faults.yaml", "results/faults/summary.json"),
+    "wrong_imu": Page(
+        write_wrong_imu, f"{STUDIES}wrong_imu.yaml", "results/wrong_imu/summary.json"
+    ),
     "frontier": Page(write_frontier, "aloft bench frontier", "results/frontier"),
     "ground": Page(write_ground, f"{STUDIES}ground.yaml", "results/ground/summary.json"),
     "known_effects": Page(

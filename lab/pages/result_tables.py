@@ -75,7 +75,7 @@ BASE: tuple[Column, ...] = (
     ("attitude in flight [mrad]", "estimator_attitude_flight_rms_rad", "", 1e3),
     ("attitude at touchdown [mrad]", "estimator_attitude_touchdown_rad", "", 1e3),
 )
-COLUMNS = {"formulations": JUMP, "controller": JUMP, "estimator": BASE}
+COLUMNS = {"formulations": JUMP, "estimator": BASE}
 """The metrics that a study's table shows."""
 AXES = ("jump", "task", "arm")
 """Axes that distinguish the rows of a table, where they differ."""
@@ -272,6 +272,18 @@ def every_robot_table(rows: Sequence[Row]) -> str:
         (
             (row["name"], "" if row["value"] is None else f"{row['value']:.0f}", row["note"])
             for row in rows
+        ),
+    )
+
+
+def robot_files_table(rows: Sequence[Row]) -> str:
+    """Format one row a file: its largest difference to MuJoCo's or Pinocchio's reading, and what becomes of it."""
+    return table(
+        ("file", "largest difference", "what becomes of it"),
+        (
+            (row["name"], "" if row["value"] is None else f"{row['value']:.0e}", row["note"])
+            for row in rows
+            if row["name"] not in ("files that differ", "kinds on purpose")
         ),
     )
 

@@ -23,10 +23,11 @@ from typing import Any
 
 import numpy as np
 
+from ...files.pip_line import pip_line
 from ...robots.description import Hull, RobotDescription
 from ...robots.shapes import surface
 from ...robots.surfaces import quaternion_from_z, robot_surfaces
-from ...runtime.language.errors import AloftError, pip_line
+from ...runtime.language.errors import AloftError
 from ...runtime.language.extensions import is_provided, missing_extension, provided
 from ...runtime.language.importing import without_imports
 from ..file.format import RecordedField, RecordedRows, nanoseconds
@@ -251,10 +252,21 @@ def export_parquet(run: RecordedRun, path: Path, names: Sequence[str] = ()) -> N
         ],
         metadata=about,
     )
-    with parquet.ParquetWriter(path, schema) as writer:
+    with parquet.ParquetWriter(path, schema, write_statistics=with_statistics(schema)) as writer:
         for batch in run.batches(ROW_GROUP):
             arrays = [pa.array(np.ascontiguousarray(values)) for values in table.values(batch)]
             writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+
+
+def with_statistics(schema: Any) -> list[str]:
+    """Return the columns of a Parquet file that have statistics: all but floats.
+
+    The least of a column of zeros is written as -0.0, and pyarrow's filter ``in [0.0]`` then takes it that
+    the column has no zero.
+    """
+    import pyarrow as pa
+
+    return [field.name for field in schema if not pa.types.is_floating(field.type)]
 
 
 def _metadata(column: NamedColumn) -> dict[str, str] | None:

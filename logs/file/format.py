@@ -12,6 +12,8 @@ output and a field. All but the static ones are on the timelines ``t`` (exact na
 ``graph``            the graph as it ran, after includes, sub-graphs and overrides, as text
 ``rows``             ``aloft:packed``: the bytes of the bus after each of some ticks without a
                      gap, at most half a second of them; see ``row_codec``
+``held/N``           ``aloft:packed``: the same of the large fields of slow blocks, in the ticks in
+                     which these ran; see ``held_fields``
 ``signals/B/P/F``    the curve of a field as ``Scalars``, for the viewer: of those in the plots that
                      it shows first, and of as many ticks as the curve needs; see ``drawing``
 ``keyframes``        ``aloft:bus`` and ``aloft:state`` at tick k: the bytes of both buffers before
@@ -37,7 +39,7 @@ from __future__ import annotations
 import json
 from base64 import b64decode, b64encode
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from hashlib import blake2b
 from math import prod
 from typing import Any, Self
@@ -52,12 +54,12 @@ from ...runtime.language.signals import Slot
 
 MOST_OF_BUFFER = 1 << 30
 """Bytes of a bus or a state, at most."""
-FORMAT = 5
+FORMAT = 6
 """The number of this format, the only one that is read."""
 SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
 LIMITS, TIMES, WORLD, GRAPH, DIAGRAM = "limits", "times", "world", "graph", "diagram"
 PLOTS = "plots"
-ROWS = "rows"
+ROWS, HELD = "rows", "held"
 BUS, STATE, NOTE, PACKED = "bus", "state", "note", "packed"
 
 
@@ -230,7 +232,10 @@ class Header:
 
     def to_json(self) -> str:
         """Write the header as JSON text."""
-        data = asdict(self) | {"schema_hashes": self.schema_hashes}
+        plain = replace(
+            self, robot=None, bus_start=b""
+        )  # which asdict would copy, every mesh of it
+        data = asdict(plain) | {"schema_hashes": self.schema_hashes}
         data["robot"] = self.robot and self.robot.model_dump(mode="json", context={"looks": True})
         data["bus_start"] = b64encode(self.bus_start).decode()
         return json.dumps(data)

@@ -22,7 +22,7 @@ from .dependencies import contents, digests, files_read, parameter_files, projec
 from .format import Header, RecordedBlock, RecordedField, RecordedLayout
 
 RECORDED_VERSIONS = (
-    "aloft", "numpy", "llvmlite", "mujoco-core", "pin", "qpsolvers", "daqp", "casadi", "rerun-sdk",
+    "numpy", "llvmlite", "mujoco-core", "pin", "qpsolvers", "daqp", "casadi", "rerun-sdk",
 )  # fmt: skip
 _KERNEL_NAMES = (
     "scipy_openblas_get_corename64_", "scipy_openblas_get_corename",
@@ -231,7 +231,9 @@ def _names(signal: type[Signal]) -> tuple[str, ...]:
 
 def versions() -> dict[str, str]:
     """Return the versions of Python and of every package that computes something in a run."""
-    found = {"python": platform.python_version()}
+    from ... import __version__
+
+    found = {"python": platform.python_version(), "aloft": __version__}
     for name in RECORDED_VERSIONS:
         try:
             found[name] = version(name)

@@ -11,14 +11,14 @@ speaks of, and the CRC-32 of the whole message. The seal of the first message co
 too. So every byte before the footer is under a checksum, and nothing is given to Rerun or Arrow
 unless its checksum is right: neither of them survives every damaged message.
 
-A file that another program has written again, such as ``rerun rrd filter``, has no seals; of it
-only the framing can be checked.
+A file that another program has written again, such as ``rerun rrd filter``, has no seals; Rerun reads
+it, see ``rewritten``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from pathlib import Path
 from struct import Struct
@@ -28,6 +28,7 @@ from zlib import crc32
 from ...runtime.language.errors import AloftError
 from . import protobuf
 from .index import FOOTER_END, FOOTER_SIZE, footer
+from .rewritten import read_chunks
 
 FILE_HEAD = 12
 MAGIC = b"RRF2"
@@ -67,6 +68,8 @@ class Content(IntEnum):
     """Any of these, in a file without seals."""
     INDEX = 7
     """Index of all other messages, for Rerun's tools."""
+    HELD = 8
+    """Large fields of slow blocks, in the ticks in which these ran."""
 
 
 @dataclass(frozen=True)
@@ -122,6 +125,7 @@ class Scan:
         sealed: whether it has checksums.
         closed: whether it was closed by who wrote it.
         end: where the last intact message ends.
+        chunks: entity and table of each message of a file without seals, as Rerun has read them.
     """
 
     path: Path
@@ -131,6 +135,7 @@ class Scan:
     sealed: bool
     closed: bool
     end: int
+    chunks: tuple[tuple[str, Any], ...] = field(default=(), repr=False, compare=False)
 
     def of(self, content: Content) -> list[FileMessage]:
         """Return the messages with that content; in a file without seals all messages with tables."""
@@ -189,12 +194,18 @@ class _Scanner:
     def scan(self) -> Scan:
         if self._head[:4] != MAGIC and not self._sealed:
             raise ValueError(f"{self._path} is not a Rerun file of this format")
-        found: list[FileMessage] = []
+        if not self._sealed:
+            found = read_chunks(self._path)
+            numbers = tuple(FileMessage(k, 0, ARROW) for k in range(len(found.all)))
+            return Scan(
+                self._path, self._size, numbers, (), False, found.closed, self._size, found.all
+            )
+        messages: list[FileMessage] = []
         damage: list[Damage] = []
         place, closed = FILE_HEAD, False
         expected = 0
         while place < self._size:
-            message = self._at(place, first=not found and not damage)
+            message = self._at(place, first=not messages and not damage)
             if message is None:
                 beyond = self._next_after(place)
                 if beyond is None:
@@ -206,14 +217,14 @@ class _Scanner:
                 place = beyond
                 expected = -1
                 continue
-            if self._sealed and message.number != expected >= 0:
+            if message.number != expected >= 0:
                 damage.append(Damage(place, place))
             expected = message.number + 1
-            found.append(message)
+            messages.append(message)
             place = message.end
-        end = found[-1].end if found else FILE_HEAD
-        named = tuple(_named(each, found) for each in damage)
-        return Scan(self._path, self._size, tuple(found), named, self._sealed, closed, end)
+        end = messages[-1].end if messages else FILE_HEAD
+        named = tuple(_named(each, messages) for each in damage)
+        return Scan(self._path, self._size, tuple(messages), named, True, closed, end)
 
     def _at(self, place: int, *, first: bool) -> FileMessage | None:
         """Read the intact message at ``place``."""
@@ -224,8 +235,6 @@ class _Scanner:
         kind, length = HEAD.unpack(head)
         if not END < kind <= _LAST_KIND or place + HEAD.size + length > self._size:
             return None
-        if not self._sealed:
-            return FileMessage(place, HEAD.size + length, kind)
         if length < SEAL_SIZE:
             return None
         body = self._file.read(length)
@@ -241,8 +250,6 @@ class _Scanner:
         kind, length = HEAD.unpack(head)
         if kind != END:
             return False
-        if not self._sealed:
-            return True  # an index follows it
         if head == CLOSING:
             return place + len(CLOSING) == self._size
         if place + HEAD.size + length + FOOTER_SIZE != self._size or length < SEAL_SIZE:
@@ -256,7 +263,7 @@ class _Scanner:
     def _is_damage(self, place: int) -> bool:
         """Tell whether the bytes at ``place``, behind which nothing is intact, are no message cut
         short."""
-        if self._sealed and any(self._ends_closed(place, size) for size in _CLOSING_SIZES):
+        if any(self._ends_closed(place, size) for size in _CLOSING_SIZES):
             return True
         self._file.seek(place)
         head = self._file.read(HEAD.size)
@@ -283,8 +290,6 @@ class _Scanner:
 
     def _next_after(self, place: int) -> int | None:
         """Find the next intact message: behind a seal that stands behind ``place``."""
-        if not self._sealed:
-            return None
         at = place
         while at < self._size:
             self._file.seek(at)
@@ -313,9 +318,14 @@ def _checked(place: int, head: bytes, body: bytes, known: int) -> FileMessage | 
 
 def _named(damage: Damage, found: list[FileMessage]) -> Damage:
     """Return the damage with the ticks around it."""
-    rows = [m for m in found if m.content is Content.ROWS]
-    after = max((m.last for m in rows if m.place < damage.begin), default=None)
-    before = min((m.first for m in rows if m.place >= damage.end), default=None)
+    afters, befores = [], []
+    for kind in (Content.ROWS, Content.HELD):
+        parts = [m for m in found if m.content is kind]
+        if parts or kind is Content.ROWS:
+            afters.append(max((m.last for m in parts if m.place < damage.begin), default=None))
+            befores.append(min((m.first for m in parts if m.place >= damage.end), default=None))
+    after = None if None in afters else min(tick for tick in afters if tick is not None)
+    before = None if None in befores else max(tick for tick in befores if tick is not None)
     return replace(damage, after=after, before=before)
 
 
@@ -406,10 +416,11 @@ def scanned(path: Path) -> Scan:
     """
     try:
         return scan(path)
-    except ValueError:
-        raise RecordingError(
-            f"{path} is not a recording: it does not begin like a file of Rerun's"
-        ) from None
+    except ValueError as error:
+        why = "it does not begin like a file of Rerun's"
+        if path.read_bytes()[:4] == MAGIC:
+            why = f"Rerun cannot read it, perhaps because it was cut off early ({error})"
+        raise RecordingError(f"{path} is not a recording: {why}") from None
 
 
 def expect_intact(found: Scan) -> None:
@@ -440,6 +451,10 @@ def tables(
 
 def located(found: Scan, content: Content) -> Iterator[tuple[FileMessage, str, Any]]:
     """Yield message, entity and record batch of all messages with that content."""
+    if not found.sealed:
+        for message in found.of(content):
+            yield message, *found.chunks[message.place]
+        return
     with found.path.open("rb") as file:
         for message in found.of(content):
             try:
@@ -459,6 +474,8 @@ def unreadable(found: Scan, message: FileMessage, error: Exception) -> Recording
 def tables_at(found: Scan, message: FileMessage) -> tuple[str, Any]:
     """Read entity and record batch of one message. Raises ``RecordingError``."""
     assert message.kind == ARROW
+    if not found.sealed:
+        return found.chunks[message.place]
     with found.path.open("rb") as file:
         try:
             return table_of(body_of(file, message))

@@ -11,10 +11,7 @@
 from __future__ import annotations
 
 import json
-import os
-from bisect import bisect_left
 from collections.abc import Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cached_property
@@ -35,8 +32,6 @@ from .format import (
     KEYFRAMES,
     NOTE,
     NOTES,
-    PACKED,
-    ROWS,
     STATE,
     Header,
     RecordedField,
@@ -45,144 +40,21 @@ from .format import (
 from .messages import (
     Content,
     Damage,
-    FileMessage,
     NoRunError,
     RecordingError,
     Scan,
     expect_intact,
-    located,
     scanned,
     tables,
     tables_at,
-    unreadable,
 )
-from .row_codec import unpack, unpack_bytes
-
-MOST_THREADS = 4
-"""Threads that unpack rows: most of the work is done outside of Python."""
-TickRows = tuple[NDArray[np.int64], NDArray[np.uint8]]
-"""Ticks (n,) and rows (n, bytes)."""
-
-
-@dataclass(frozen=True)
-class _PackedPiece:
-    """Some ticks without a gap: the message that holds them, and the row of its table."""
-
-    message: FileMessage
-    row: int
-    first: int
-    last: int
-
-
-class PackedRows:
-    """The rows of a recording; in memory there is a batch at a time."""
-
-    def __init__(self, found: Scan, header: Header) -> None:
-        self._found, self._header = found, header
-        pieces = self._sealed() if found.sealed else self._without_seals()
-        self._pieces = sorted(pieces, key=lambda piece: piece.first)
-        self._lasts = [piece.last for piece in self._pieces]
-
-    def _sealed(self) -> Iterator[_PackedPiece]:
-        """Yield the pieces of a file with seals, which say what is in each message."""
-        for message in self._found.of(Content.ROWS):
-            yield _PackedPiece(message, 0, message.first, message.last)
-
-    def _without_seals(self) -> Iterator[_PackedPiece]:
-        """Yield the pieces of a file that another program has written again, which may have put
-        several into one message."""
-        for message, name, batch in located(self._found, Content.ROWS):
-            if name == f"/{ROWS}":
-                for row in range(len(batch)):
-                    first, rows = self._unpacked(message, batch, row)
-                    yield _PackedPiece(message, row, first, first + len(rows) - 1)
-
-    def _unpacked(
-        self, message: FileMessage, batch: Any, row: int, part: tuple[int, int] | None = None
-    ) -> tuple[int, NDArray[np.uint8]]:
-        """Unpack first tick and rows (n, bytes) of a piece, or of each row the bytes ``part`` only."""
-        try:
-            packed = batch[f"aloft:{PACKED}"][row].values.to_numpy().tobytes()
-            first, rows = unpack(packed) if part is None else unpack_bytes(packed, *part)
-            if self._found.sealed and (first, len(rows)) != (
-                message.first, message.last + 1 - message.first,
-            ):  # fmt: skip
-                raise ValueError("these rows are not of the ticks that their seal names")
-            if part is None and rows.shape[1] != self._header.bus.size:
-                raise ValueError("these rows belong to another layout")
-        except (ValueError, KeyError) as error:
-            raise unreadable(self._found, message, error) from error
-        return first, rows
-
-    @cached_property
-    def ticks(self) -> NDArray[np.int64]:
-        """The recorded ticks in order, (ticks,)."""
-        count = sum(m.last + 1 - m.first for m in self._pieces)
-        if any(m.last < m.first for m in self._pieces) or count > MOST_TICKS * len(self._pieces):
-            raise RecordingError(
-                f"{self._found.path} says that {len(self._pieces)} messages hold {count} ticks; the "
-                f"expected number is {MOST_TICKS} in each at most"
-            )
-        found = [np.arange(m.first, m.last + 1, dtype=np.int64) for m in self._pieces]
-        return np.unique(np.concatenate([np.zeros(0, np.int64), *found]))
-
-    def pieces(self, first: int, last: int) -> Iterator[TickRows]:
-        """Yield the ticks from ``first`` up to, without, ``last``, and their rows, some at a time."""
-        begin = bisect_left(self._lasts, first)
-        for piece in self._pieces[begin:]:
-            if piece.first >= last:
-                return
-            _, batch = tables_at(self._found, piece.message)
-            start, rows = self._unpacked(piece.message, batch, piece.row)
-            ticks = np.arange(start, start + len(rows), dtype=np.int64)
-            low, high = bisect_left(ticks, first), bisect_left(ticks, last)
-            yield ticks[low:high], rows[low:high]
-
-    def rows(self) -> NDArray[np.uint8]:
-        """Unpack the rows of all ticks, (ticks, bytes), in several threads."""
-        return self._all()
-
-    def signal(self, field: RecordedField) -> NDArray[Any]:
-        """Read one field at every tick, (ticks, ...), unpacked by several threads."""
-        found = self._all(self._header.bus.layout().byte_range(field.name))
-        return found.view(field.dtype).reshape(len(found), *field.shape)
-
-    def _all(self, part: tuple[int, int] | None = None) -> NDArray[np.uint8]:
-        """Unpack the rows of all ticks, (ticks, bytes), or of each row the bytes ``part`` only."""
-        ticks = self.ticks
-        size = self._header.bus.size if part is None else part[1] - part[0]
-        whole = len(ticks) * size
-        if whole > max(MOST_KEPT, LIKELY_RATIO * self._found.size):
-            raise RecordingError(
-                f"{self._found.path} has {self._found.size} bytes and would unpack to {whole}, which "
-                "no recording of a run does; read it with pieces() or window() if it is yours"
-            )
-        rows = np.empty((len(ticks), size), np.uint8)
-
-        def unpack_one(piece: _PackedPiece) -> None:
-            _, batch = tables_at(self._found, piece.message)
-            first, some = self._unpacked(piece.message, batch, piece.row, part)
-            place = bisect_left(ticks, first)
-            rows[place : place + len(some)] = some
-
-        with ThreadPoolExecutor(min(MOST_THREADS, os.cpu_count() or 1)) as pool:
-            for _ in pool.map(unpack_one, self._pieces):
-                pass
-        return rows
-
+from .packed_rows import MOST_KEPT, PackedRows, TickRows
 
 __all__ = ["RecordedRun", "RecordingError", "read"]
 
 READ_ALONE = 3
 """Signals that are each taken from the file for themselves. Who asks for more wants many, and one
 reading of everything is faster then."""
-MOST_KEPT = 2 << 30
-"""The bytes of all rows, at most, that are then kept in memory."""
-LIKELY_RATIO = 200
-"""Bytes of rows that a recording's byte stands for, at most, where it is a large one; of the shipped graphs
-it is three."""
-MOST_TICKS = 1 << 16
-"""Ticks that are packed together, at most; a writer of aloft packs 512."""
 
 
 @dataclass(frozen=True)
@@ -238,6 +110,18 @@ class RecordedRun:
         if "rows" in self.__dict__ or (len(self._asked) > READ_ALONE and whole <= MOST_KEPT):
             return self.header.bus.layout().view(self.rows, name)
         return self._source.signal(known[name])
+
+    def samples(self, name: str) -> tuple[NDArray[np.int64], NDArray[Any]]:
+        """Return the ticks at which a signal is kept, (n,), and its values there, (n, ...): a large field of a
+        slow block where the block ran, any other in every tick.
+
+        Raises:
+            KeyError: there is no such signal; the message has the nearest names.
+        """
+        known = self.signals()
+        if name not in known:
+            name = only_field(name, known) or self.nearest(name)
+        return self._source.samples(known[name])
 
     @cached_property
     def _asked(self) -> set[str]:
@@ -393,9 +277,12 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
         if found.sealed or not found.messages:
             raise RecordingError(f"{path} was cut off before its beginning was written")
         raise NoRunError(f"{path} is a Rerun file, but not a recording of a run by aloft")
-    number = json.loads(texts["header"]).get("format", 0)
+    number, maker = _made_by(texts["header"])
     if number != FORMAT:
-        fix = "update aloft" if number > FORMAT else "read it with an older one"
+        newer = isinstance(number, int) and number > FORMAT
+        fix = f"update aloft to {maker or 'a newer one'}" if newer else (
+            f"read it with aloft {maker}" if maker else "read it with an older one"
+        )  # fmt: skip
         raise RecordingError(
             f"{path} has format {number}, this version of aloft reads {FORMAT}; {fix}"
         )
@@ -404,7 +291,7 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
         for _, batch in tables(found, Content.NOTES, f"/{NOTES}")
         for row, text in zip(
             batch[0].to_pylist(),  # the numbers of the rows, which grow in the order of writing
-            batch[f"aloft:{NOTE}"].flatten().to_pylist(),
+            [text for (text,) in batch[f"aloft:{NOTE}"].to_pylist()],  # `flatten` imports 0.1 s
             strict=True,
         )
     ]
@@ -417,7 +304,36 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         reason = " ".join(str(error).split())
         raise RecordingError(f"{path} has a header that aloft does not write: {reason}") from error
-    return RecordedRun(path, header, outcome, ordered, found)
+    run = RecordedRun(path, header, outcome, ordered, found)
+    if not found.sealed and not damaged:
+        _expect_nothing_left_out(run)
+    return run
+
+
+def _expect_nothing_left_out(run: RecordedRun) -> None:
+    """Raise ``RecordingError`` where another program that wrote the file again has left something out."""
+    by = f"{run.path} was written again by another program, which left out"
+    if any(
+        "tick" not in b.schema.names for _, b in tables(run.scan, Content.KEYFRAME, f"/{KEYFRAMES}")
+    ):
+        raise RecordingError(
+            f"{by} the timeline 'tick'; keep it, or use the recording as aloft wrote it"
+        )
+    lost = run.missing_ticks - run.dropped_ticks
+    if run.outcome is not None and lost > 0:
+        raise RecordingError(
+            f"{by} {lost} ticks, as `rerun rrd split` and `filter` do; it has {len(run.ticks)}. Use the recording "
+            "as aloft wrote it; aloft.logs.read(FILE, damaged=True) reads the rest"
+        )
+
+
+def _made_by(header: str) -> tuple[Any, str]:
+    """Return the number of the format and the version of aloft that wrote it, as far as a header says."""
+    try:
+        data = json.loads(header)
+        return data.get("format", 0), str(data.get("versions", {}).get("aloft", ""))
+    except (ValueError, AttributeError):
+        return 0, ""
 
 
 def _properties(found: Scan) -> dict[str, str]:
@@ -434,7 +350,7 @@ def _properties(found: Scan) -> dict[str, str]:
 
 
 def _snapshots_in(batch: Any) -> Iterator[Snapshot]:
-    for k, tick in enumerate(batch["tick"].cast("int64").to_pylist()):
+    for k, tick in enumerate(batch["tick"].to_pylist()):
         parts = {
             name: batch[f"aloft:{name}"][k].values.to_numpy().tobytes()
             for name in (BUS, STATE)

@@ -6,13 +6,13 @@ like any other. It holds the ticks that every part has recorded.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from hashlib import blake2b
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from ..file.header import make_header
 from ..file.reader import RecordedRun, read
 from .writer import RecordingWriter
 
+Value = TypeVar("Value")
 _OF_ALL = ("life", "parameter")
 """The kinds of notes that every part has; one of them is enough."""
 _STAND_IN = f"{LinkInput.__module__}:{LinkInput.__name__}"
@@ -207,13 +208,17 @@ def _whole_header(placed: PlacedGraph, memory: Memory, parts: Mapping[str, Recor
         blocks=tuple(
             replace(recorded.get(block.path, block), folder=block.folder) for block in made.blocks
         ),
-        **{
-            name: {key: value for each in headers for key, value in getattr(each, name).items()}
-            for name in ("seeds", "parameters", "files", "contents")
-        },
+        seeds=_joined(each.seeds for each in headers),
+        parameters=_joined(each.parameters for each in headers),
+        files=_joined(each.files for each in headers),
+        contents=_joined(each.contents for each in headers),
         source=first.source,
         project=first.project,
     )  # fmt: skip
+
+
+def _joined(found: Iterable[Mapping[str, Value]]) -> dict[str, Value]:
+    return {key: value for each in found for key, value in each.items()}
 
 
 def _pieces(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> Any:

@@ -23,15 +23,17 @@ from ...processes.child_process import ChildError
 from ...robots.surfaces import missing_meshes
 from ...runtime.language.errors import AloftError
 from ...runtime.language.parameter_change import ParameterChange
+from ...runtime.language.recording_cost import large_recording
 from ...runtime.running.memory import BoundGraph
 from ...runtime.running.run_result import RunResult
 from ...runtime.running.sink import Note, Sink, parameter_note
 from ..file.code import code_of, remember
 from ..file.header import header_of
+from ..file.held_fields import SplitBus, split_bus
 from ..file.reader import read
 from .output_file import cause_of, remedy, replaced, reserve_output, unfinished_name
 from .recorder_link import RecorderLink, rerun_is_installed
-from .recorder_protocol import KEYFRAME, NOTE, REWIND, ROW, RecorderReport, RecorderTask
+from .recorder_protocol import KEYFRAME, NOTE, PART, REWIND, ROW, RecorderReport, RecorderTask
 from .ring import space_of
 
 STALL_TIME = 60.0
@@ -41,6 +43,8 @@ GIVE_UP_TIME = 600.0
 """Seconds without any progress after which a simulation gives the process up, too."""
 
 
+RING_BYTES = 1 << 26
+"""Bytes of the ring, at most."""
 WhenFull = Literal["wait", "drop"]
 
 
@@ -58,7 +62,8 @@ class Recorder(Sink):
         flush_period: seconds after which what has come is handed to the operating system; a
             process that is killed loses no more than that.
         sync_period: seconds after which it is put on the disk; a power cut takes no more than that.
-        ring_time: seconds of the run that fit into the ring.
+        ring_time: seconds of the run that fit into the ring, if they fit into its bytes.
+        ring_bytes: bytes of the ring, at most, but that it always holds four keyframes.
         split: seconds of the graph's time after which the recording goes on in a new file, at the
             next keyframe: ``jump.rrd``, ``jump-part002.rrd`` ... Each can be read and replayed by
             itself. Zero for one file.
@@ -92,6 +97,7 @@ class Recorder(Sink):
         flush_period: float = 0.5,
         sync_period: float = 5.0,
         ring_time: float = 4.0,
+        ring_bytes: int = RING_BYTES,
         split: float = 0.0,
         live: str = "",
         link: RecorderLink | None = None,
@@ -114,7 +120,9 @@ class Recorder(Sink):
         self._when_full = when_full
         self._keyframe_period = keyframe_period
         self._periods = flush_period, sync_period
-        self._ring_time, self._split = ring_time, split
+        self._ring, self._split = (ring_time, ring_bytes), split
+        self._parts: HeldParts | None = None
+        self._begins = True
         self._live = live
         self._on_warning = on_warning
         self._gap: tuple[int, int, int] | None = None
@@ -171,11 +179,18 @@ class Recorder(Sink):
         if not rerun_is_installed():
             return "Rerun cannot be imported", "pip install rerun-sdk, or --no-record writes none"
         rate, frame = self._bound.graph.base_rate, 4 * space_of(len(self._frame))
-        capacity = round(self._ring_time * rate) * space_of(len(self._bus)) + frame
         graph = self._bound.graph
+        if self.path is not None and (large := large_recording(graph)):
+            self._warn(large)
         if graph.resolved is not None:
             remember(code_of(graph.resolved, graph.robot))  # what the user runs he may run again
-        header = header_of(self._bound).to_json()
+        about = header_of(self._bound)
+        split, (ring_time, ring_bytes) = split_bus(about), self._ring
+        self._parts = HeldParts(split, self._bus) if split.held else None
+        row = space_of(split.base.layout.size)
+        row += sum(space_of(part.layout.size) // part.period for part in split.held)
+        capacity = min(round(ring_time * rate) * row, ring_bytes) + frame
+        header = about.to_json()
         try:
             output = None
             if self.path is not None:
@@ -202,7 +217,12 @@ class Recorder(Sink):
         if self.link is None:
             return
         self._seen += 1
-        if self._gap is not None or not self._write(ROW, tick, self._bus):
+        if self._parts is not None and self._gap is None and not self._begins:
+            written = self._write(PART, tick, self._parts.at(tick))
+        else:
+            written = self._gap is None and self._write(ROW, tick, self._bus)
+        self._begins = False
+        if not written:
             self._find_room(tick)
         if self._every and (tick + 1) % self._every == 0:
             self._keep_keyframe(tick + 1)
@@ -294,6 +314,7 @@ class Recorder(Sink):
                 self._warn(f"nothing is recorded after the run has gone back to tick {tick}")
                 return
             time.sleep(1e-3)
+        self._begins = True
         self._keep_keyframe(tick)
 
     def _note_change(self, change: ParameterChange) -> None:
@@ -368,6 +389,38 @@ class Recorder(Sink):
         with suppress(AloftError, OSError):
             count += len(read(unfinished_name(path), damaged=True).ticks)
         return count, unfinished_name(path)
+
+
+class HeldParts:
+    """Gathers the bytes of a row that are put into the ring where some fields are held.
+
+    Args:
+        split: the parts of the bus.
+        bus: its bytes.
+    """
+
+    def __init__(self, split: SplitBus, bus: memoryview) -> None:
+        self._split, self._from = split, bus
+        self._records: dict[tuple[bool, ...], tuple[bytearray, list[tuple[slice, slice]]]] = {}
+
+    def at(self, tick: int) -> bytearray:
+        """Return the base and the held groups that are due in ``tick``; valid until the next call."""
+        due = tuple(part.is_due(tick) for part in self._split.held)
+        if due not in self._records:
+            self._records[due] = self._made(due)
+        record, copies = self._records[due]
+        for to, begin in copies:
+            record[to] = self._from[begin]
+        return record
+
+    def _made(self, due: tuple[bool, ...]) -> tuple[bytearray, list[tuple[slice, slice]]]:
+        parts = [p for p, is_due in zip(self._split.held, due, strict=True) if is_due]
+        copies, place = [], 0
+        for part in (self._split.base, *parts):
+            for begin, end, to, until in part.copies:
+                copies.append((slice(place + to, place + until), slice(begin, end)))
+            place += part.layout.size
+        return bytearray(place), copies
 
 
 def _no_room(kind: int, tick: int, data: memoryview | bytes | bytearray) -> bool:

@@ -24,14 +24,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...processes.child import report_ready
 from ...runtime.running.failures import describe
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.sink import Note
 from ..file.format import Header
+from ..file.held_fields import split_bus
 from .output_file import OutputFile, cause_of, reserve_output, split_name
-from .recorder_protocol import KEYFRAME, NOTE, REWIND, ROW, RecorderReport, RecorderTask
+from .recorder_protocol import KEYFRAME, NOTE, PART, REWIND, ROW, RecorderReport, RecorderTask
 from .ring import Record, RingReader
 from .writer import RecordingWriter
 
@@ -63,9 +65,15 @@ class RecorderProcess:
         record = next(self._ring.records())
         header = Header.from_json(bytes(record.data).decode())
         self._bus_size = header.bus.size
-        batch = max(1, min(BATCH, BATCH_BYTES // max(1, self._bus_size)))
+        self._bus = split_bus(header)
+        base = self._bus.base.layout
+        batch = max(1, min(BATCH, BATCH_BYTES // max(1, base.size)))
         self._ticks = np.zeros(batch, np.int64)
-        self._rows = np.zeros((batch, self._bus_size), np.uint8)
+        self._rows = np.zeros((batch, base.size), np.uint8)
+        self._held: list[list[tuple[int, NDArray[np.uint8]]]] = [[] for _ in self._bus.held]
+        self._now: list[NDArray[np.uint8] | None] = [None for _ in self._bus.held]
+        """The last row of each held group."""
+        self._held_bytes, self._begins = 0, True
         self._filled = self._taken = 0
         self._notes: list[Note] = []
         self._changes: list[Note] = []
@@ -82,12 +90,14 @@ class RecorderProcess:
         if file is not None:
             self._output = OutputFile(Path(task.path), file, task.keep)
             self._guard(lambda: self._open(header))
-        self.feed = _live_feed(task.live, header) if task.live else None
+        self._shown = replace(header, bus=base)
+        self.feed = _live_feed(task.live, self._shown) if task.live else None
         self._fed_rows = self._rewinds = 0
         self._flushed = self._synced = self._drawn = self._fed = time.monotonic()
 
     def _open(self, header: Header) -> None:
         assert self._output is not None
+        self._begins = True
         self._writer = RecordingWriter(self._output.target, header, output=self._output)
 
     def _go_back(self, tick: int) -> None:
@@ -100,7 +110,7 @@ class RecorderProcess:
             self.feed.finish(None)
             self._rewinds += 1
             name = f"{self._header.name}, again from {tick / self._header.base_rate:.3f} s"
-            self.feed = _live_feed(self._task.live, self._header, f"{name} ({self._rewinds})")
+            self.feed = _live_feed(self._task.live, self._shown, f"{name} ({self._rewinds})")
 
     def _split(self, tick: int, *, back: bool = False) -> None:
         """Close the file, and go on in a new one with the tick ``tick``, or ``back`` with it."""
@@ -156,12 +166,12 @@ class RecorderProcess:
         return waited >= (period if full else SLOW_FLUSH * period)
 
     def _take_one(self, record: Record) -> None:
-        if record.kind == ROW:
-            self._rows[self._filled] = np.frombuffer(record.data, np.uint8)
+        if record.kind in (ROW, PART):
+            self._take_row(record)
             self._ticks[self._filled] = self._last_tick = record.tick
             self._filled += 1
             self._taken += 1
-            if self._filled == len(self._ticks):
+            if self._filled == len(self._ticks) or self._held_bytes >= BATCH_BYTES:
                 self._write_batch()
         elif record.kind == KEYFRAME:
             bus, state = bytes(record.data[: self._bus_size]), bytes(record.data[self._bus_size :])
@@ -177,6 +187,27 @@ class RecorderProcess:
                 self._changes.append(note)
             if self.feed is not None:
                 self.feed.note(note)
+
+    def _take_row(self, record: Record) -> None:
+        """Keep the base of a row, and of each held group its row where it is due, or begins a file."""
+        data = np.frombuffer(record.data, np.uint8)
+        whole, base = record.kind == ROW, self._bus.base
+        if not self._bus.held:
+            self._rows[self._filled] = data
+            return
+        self._rows[self._filled] = base.take(data[None])[0] if whole else data[: base.layout.size]
+        place = base.layout.size
+        for number, part in enumerate(self._bus.held):
+            if whole:
+                self._now[number] = part.take(data[None])[0]
+            elif part.is_due(record.tick):
+                self._now[number] = data[place : place + part.layout.size].copy()
+                place += part.layout.size
+            row = self._now[number]
+            if row is not None and (whole or self._begins or part.is_due(record.tick)):
+                self._held[number].append((record.tick, row))
+                self._held_bytes += row.nbytes
+        self._begins = False
 
     def flush(self) -> None:
         """Hand everything that was taken from the ring to the operating system."""
@@ -274,8 +305,13 @@ class RecorderProcess:
         """Write the ticks that wait for it."""
         self._feed_rows()
         ticks, rows = self._ticks[: self._filled], self._rows[: self._filled]
-        self._write(lambda writer: writer.write_rows(ticks, rows))
-        self._filled = self._fed_rows = 0
+        held = [
+            (np.array([tick for tick, _ in kept], np.int64), np.array([row for _, row in kept]))
+            for kept in self._held
+        ]
+        self._write(lambda writer: writer.write_parts(ticks, rows, held))
+        self._filled = self._fed_rows = self._held_bytes = 0
+        self._held = [[] for _ in self._bus.held]
 
     def _write_notes(self) -> None:
         notes, self._notes = self._notes, []

@@ -6,8 +6,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-HEADER, ROW, KEYFRAME, NOTE, REWIND = 1, 2, 3, 4, 5
-"""The kinds of records in the ring. A keyframe is the bytes of the bus, then of the state; after ``REWIND``
+HEADER, ROW, KEYFRAME, NOTE, REWIND, PART = 1, 2, 3, 4, 5, 6
+"""The kinds of records in the ring. A row is the bytes of the whole bus, a part those of its base and of the held
+groups whose blocks run in the tick (``file.held_fields``). A keyframe is the bytes of the bus, then of the state; after ``REWIND``
 come its tick and later ones once more, another way."""
 
 

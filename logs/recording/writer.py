@@ -24,8 +24,10 @@ from numpy.typing import NDArray
 from ...runtime.running.memory import Snapshot
 from ...runtime.running.run_result import RunResult
 from ...runtime.running.sink import Note, parameter_note
-from ..file.format import BUS, KEYFRAMES, PACKED, ROWS, STATE, Header, spans, time_columns
+from ..file.code import code_of, remember
+from ..file.format import BUS, HELD, KEYFRAMES, PACKED, ROWS, STATE, Header, spans, time_columns
 from ..file.header import make_header
+from ..file.held_fields import split_bus
 from ..file.index import Index
 from ..file.messages import (
     ARROW,
@@ -95,7 +97,11 @@ class RecordingWriter:
         )
         rr.set_log_time_enabled(False, recording=self._stream)
         self._made = self._stream.binary_stream()
-        self._run = RunStream(self._stream, header, detail=RECORDED)
+        self._bus = split_bus(header)
+        self._before: NDArray[np.uint8] | None = None
+        self._last = -2
+        shown = replace(header, bus=self._bus.base.layout)  # what is held is too large to be drawn
+        self._run = RunStream(self._stream, shown, detail=RECORDED)
         self._write_start()
 
     def _write_start(self) -> None:
@@ -127,6 +133,28 @@ class RecordingWriter:
 
         The rows are copied; curves and the robot in 3D are drawn of several thousand at once.
         """
+        if not self._bus.held or not len(ticks):
+            self.write_parts(ticks, rows, ())
+            return
+        before = self._before if int(ticks[0]) == self._last + 1 else None
+        kept = self._bus.changed(ticks, rows, before)
+        self._before, self._last = rows[-1].copy(), int(ticks[-1])
+        held = [
+            (ticks[places], part.take(rows[places]))
+            for places, part in zip(kept, self._bus.held, strict=True)
+        ]
+        self.write_parts(ticks, self._bus.base.take(rows), held)
+
+    def write_parts(
+        self,
+        ticks: NDArray[np.int64],
+        rows: NDArray[np.uint8],
+        held: Sequence[tuple[NDArray[np.int64], NDArray[np.uint8]]],
+    ) -> None:
+        """Write the base (n, bytes of the base) of the bus at ``ticks`` (n,), and of each held group the ticks at
+        which it is kept with its rows; see ``file.held_fields``."""
+        for number, (at, some) in enumerate(held):
+            self._write_held(number, at, some)
         for first, last in spans(ticks) if len(ticks) else ():
             most = min(ROWS_AT_ONCE, max(1, PACKED_BYTES // max(1, rows.shape[1])))
             for begin in range(int(first), int(last) + 1, most):
@@ -138,6 +166,21 @@ class RecordingWriter:
             self._drawable += len(ticks)
             if self._drawable >= min(DRAWN_TICKS, DRAWN_BYTES // max(1, rows.shape[1])):
                 self.draw()
+
+    def _write_held(self, number: int, ticks: NDArray[np.int64], rows: NDArray[np.uint8]) -> None:
+        """Write rows of a held group: one message for those that follow each other by its period."""
+        if not len(ticks):
+            return
+        period = self._bus.held[number].period
+        most = max(1, PACKED_BYTES // max(1, rows.shape[1]))
+        start = 0
+        while start < len(ticks):
+            end = start + 1
+            while end < min(len(ticks), start + most) and ticks[end] - ticks[end - 1] == period:
+                end += 1
+            self._send_packed(f"{HELD}/{number}", int(ticks[start]), rows[start:end])
+            self._put(Content.HELD, int(ticks[start]), int(ticks[end - 1]))
+            start = end
 
     def _write_packed(self, first: int, rows: NDArray[np.uint8]) -> None:
         """Write rows as one message; where there is no room for it, as many as there is room for.
@@ -155,15 +198,18 @@ class RecordingWriter:
             self._write_packed(first + half, rows[half:])
 
     def _write_whole(self, first: int, rows: NDArray[np.uint8]) -> None:
+        self._send_packed(ROWS, first, rows)
+        self._put(Content.ROWS, first, first + len(rows) - 1)
+        self.recorded += len(rows)
+
+    def _send_packed(self, entity: str, first: int, rows: NDArray[np.uint8]) -> None:
         import rerun as rr
 
         packed = pack(first, rows)
         # as an Arrow array: Rerun would make a Python object of each byte of a NumPy array
         column = rr.DynamicArchetype.columns("aloft", components={PACKED: _bytes(packed)})
         times = time_columns(self.header, np.array([first]))
-        self._stream.send_columns(ROWS, times, list(column.partition([len(packed)])))
-        self._put(Content.ROWS, first, first + len(rows) - 1)
-        self.recorded += len(rows)
+        self._stream.send_columns(entity, times, list(column.partition([len(packed)])))
 
     def draw(self) -> None:
         """Write for the viewer what has come since this was called last."""
@@ -309,6 +355,8 @@ def write_recording(path: str | PathLike[str], result: RunResult) -> Recording:
     start = rows[0].tobytes() if len(rows) else bytes(log.layout.size)
     first = log.ticks[0] if log.ticks else 0
     header = make_header(result.graph, log.layout, start, first_tick=first)
+    if result.graph.resolved is not None:
+        remember(code_of(result.graph.resolved, result.graph.robot))
     writer = RecordingWriter(path, header, result.run_hash)
     try:
         writer.write_rows(ticks, rows)

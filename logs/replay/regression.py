@@ -242,7 +242,7 @@ def _import_of(spec: BlockSpec, folder: Path) -> tuple[str, str]:
 
 _TEMPLATE = '''"""Block '{path}' ({kind}) in ticks {first} to {last} of a recorded run.
 
-Made by `aloft test --from {source} --block {path} --ticks {first}:{end}`. The file beside this
+Made by `aloft test --recording {source} --block {path} --ticks {first}:{end}`. The file beside this
 one, of the same name, holds what the block remembered before, its inputs and its outputs.
 """
 

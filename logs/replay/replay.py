@@ -356,7 +356,7 @@ def _expect_no_gap(recorded: Replayable, fed: Sequence[str], start: int, end: in
         before, after = inside[gaps[0]], inside[gaps[0] + 1]
         raise ReplayError(
             f"ticks {before + 1} to {after - 1} were not recorded, so blocks cannot be fed from "
-            f"the recording there; begin after them with --from {after}"
+            f"the recording there; begin after them with --from-tick {after}"
         )
 
 

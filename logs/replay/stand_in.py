@@ -98,7 +98,7 @@ def stand_in(path: str, block: RecordedBlock | None) -> type[Block]:
         "outside": ports.get("outside", "no"),
     }
     for port, data in ports["inputs"].items():
-        default = {} if data["optional"] else None
+        default: dict[str, Any] | None = {} if data["optional"] else None
         body[port] = Input(
             _signal(data), text=data["text"], default=default, reads_truth=data["truth"]
         )
@@ -132,8 +132,8 @@ def _known(name: str, fields: Mapping[str, Field]) -> type[Signal] | None:
 
 
 def _field(data: Mapping[str, Any]) -> Field:
-    names = {int(number): name for number, name in data["values"].items()}
-    values = IntEnum("Values", {name.upper(): number for number, name in names.items()}) if names else None  # fmt: skip
+    names = {name.upper(): int(number) for number, name in data["values"].items()}
+    values: Any = IntEnum("Values", names) if names else None
     return Field(
         tuple(data["shape"]), unit=data["unit"], frame=data["frame"], dtype=data["dtype"],
         text=data["text"], values=values,

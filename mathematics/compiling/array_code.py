@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .arguments import ArrayType
 from .failures import Failure
@@ -18,6 +20,28 @@ SIZE_BITS = 47
 
 class FunctionCode(NumberCode):
     """The body of one function, written from its beginning to its end."""
+
+    def room(self, shape: tuple[int, ...], dtype: str) -> Value:
+        """Make an array of zeros on the stack."""
+        kind = ArrayType(dtype, len(shape), "C")
+        count = int(np.prod(shape))
+        place, leaf = f"%{self.name('room')}", memory_type(kind)
+        self.entry.append(f"  {place} = alloca [{max(count, 1)} x {leaf}], align 16")
+        made = Value(kind, (place, *map(str, shape)))
+        flat = Value(ArrayType(dtype, 1, "C"), (place, str(count)))
+        zero = number(False if dtype == "bool" else 0 if dtype == "int64" else 0.0)
+        self.loop([str(count)], lambda i: self.assign(flat.array, self.place(flat, i), zero))
+        return made
+
+    def constant_array(self, value: NDArray[Any]) -> Value:
+        """Return an array that stands in the kernel's module."""
+        kind = ArrayType(value.dtype.name, value.ndim, "C")
+        content = np.ascontiguousarray(value).tobytes()
+        name = f"array_{hashlib.blake2b(content + str(kind).encode(), digest_size=8).hexdigest()}"
+        octets = "".join(f"\\{octet:02x}" for octet in content)
+        text = f'@{name} = private constant [{len(content)} x i8] c"{octets}", align 16'
+        self.declared[name] = text
+        return Value(kind, (f"@{name}", *map(str, value.shape)))
 
     def size(self, value: Value, dimension: int) -> Value:
         """``value.shape[dimension]``."""

@@ -7,7 +7,7 @@ import copy
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from .expressions import indices_of, shown
+from .expressions import indices_of, repeats, shown
 from .kinds import NUMBER, ArrayKind
 from .slices import Cut, Slices, called, minus, plus
 
@@ -25,8 +25,11 @@ class ArrayEquations(Slices):
     _products: set[str]
     """Names of cross products, whose elements are numbers: ``cross_1__0`` and so on."""
 
-    def _loops(self, node: ast.stmt, target: ast.expr, value: ast.expr) -> list[ast.stmt]:
-        """Write the loops for ``target = value``, where the target is a part of an array."""
+    def _loops(
+        self, node: ast.stmt, target: ast.expr, value: ast.expr, mask: ast.expr | None = None
+    ) -> list[ast.stmt]:
+        """Write the loops for ``target = value``, where the target is a part of an array, and only for
+        elements that a mask selects."""
         assert isinstance(target, ast.Subscript)
         kind = self._kind(target)
         assert isinstance(kind, ArrayKind)
@@ -34,11 +37,14 @@ class ArrayEquations(Slices):
         self._check_shapes(node, kind, value)
         target = self._settled_target(target)
         value = self._settle(value, self._path(target))
+        if mask is not None:
+            mask = self._settle(mask, self._path(target))
+            self._check_overlap(node, target, mask)
         unrolled = any(
             isinstance(each, ast.Call) and self._is_cross(each) for each in ast.walk(value)
         )
         if unrolled:
-            if kind.rank != 1:
+            if kind.rank != 1 or mask is not None:
                 raise self._error(node, "a cross product is assigned to a vector of three")
             value = self._with_cross_products(value)
         self._check_overlap(node, target, value)
@@ -53,6 +59,10 @@ class ArrayEquations(Slices):
         outer, self._ahead = self._ahead, []
         inner: ast.stmt = self._element_statement(target, value, places)
         body = [*self._ahead, inner]
+        if mask is not None:
+            self._ahead = []
+            test = self._element(mask, places)
+            body = [*self._ahead, ast.If(test, body, [])]
         self._ahead = outer
         for variable, size in zip(reversed(variables), reversed(sizes), strict=True):
             loop = ast.For(ast.Name(variable, ast.Store()), called("range", size), body, [], None)
@@ -124,7 +134,7 @@ class ArrayEquations(Slices):
         if isinstance(node, ast.Name | ast.Attribute | ast.Subscript):
             places = places[len(places) - kind.rank :]
             places = [
-                ast.Constant(0) if size == 1 else place
+                ast.Constant(0) if repeats(size) else place
                 for size, place in zip(kind.shape, places, strict=True)
             ]
             part = self._part(node, places)
@@ -137,10 +147,46 @@ class ArrayEquations(Slices):
             and kind.element is bool
         ):
             node.op = ast.Not()
+        if (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Name)
+            and node.func.id == "<outer>"
+        ):
+            a, b = (
+                self._element(each, [place]) for each, place in zip(node.args, places, strict=True)
+            )
+            return ast.copy_location(ast.BinOp(a, ast.Mult(), b), node)
         if isinstance(node, ast.Call):
+            self._complete(node)
             node.args = [self._element(each, places) for each in node.args]
             return node
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+            node.left, node.right = (
+                self._element(node.left, places),
+                self._element(node.right, places),
+            )
+            return self._power(node)
         return self._children(node, lambda each: self._element(each, places))
+
+    def _complete(self, node: ast.Call) -> None:
+        """Put the arguments of a call of a kernel in their order, with those that are left out."""
+        raise NotImplementedError
+
+    def _power(self, node: ast.BinOp) -> ast.expr:
+        """``x ** 2`` is ``x * x``, as NumPy computes it: C's ``pow`` may round it otherwise."""
+        if isinstance(node.right, ast.Constant) and node.right.value == 2:
+            simple = not any(
+                isinstance(each, ast.Call) and not self._is_conversion(each)
+                for each in ast.walk(node.left)
+            )
+            left = (
+                node.left if simple or self._ahead is None else self._kept("base", node.left, node)
+            )
+            return ast.copy_location(ast.BinOp(left, ast.Mult(), copy.deepcopy(left)), node)
+        return node
+
+    def _is_conversion(self, node: ast.Call) -> bool:
+        return isinstance(node.func, ast.Name) and node.func.id in ("float", "int", "bool")
 
     def _part(self, node: ast.expr, places: Sequence[ast.expr]) -> ast.expr:
         """Return the element of an array, or of a part of one, at some places."""
@@ -251,7 +297,7 @@ class ArrayEquations(Slices):
             )
         if isinstance(kind, ArrayKind) and kind.rank:
             pairs = zip(target.shape[::-1], kind.shape[::-1], strict=False)
-            if any(None not in (a, b) and a != b and not _repeats(b) for a, b in pairs):
+            if any(None not in (a, b) and a != b and not repeats(b) for a, b in pairs):
                 raise self._error(
                     node,
                     f"a value of shape {shown(kind.shape)} does not fit into {shown(target.shape)}",
@@ -290,6 +336,10 @@ class ArrayEquations(Slices):
                 if summed:
                     text = f"{written.array} is written while @ still reads it; use another array"
                     raise self._error(node, text)
+                roots = {self._root(each), self._root(target)}
+                if len(roots) > 1 and roots & self._partial:
+                    text = f"{written.array} is written while a part of it is read by another name"
+                    raise self._error(node, f"{text}; use another array")
                 turned = any(isinstance(a, ast.Attribute) and a.attr == "T" for a in ast.walk(each))
                 if turned or not _apart_or_same(written, self._place_of(each)):
                     text = f"{written.array} is written while another part of it is read"
@@ -333,6 +383,13 @@ class ArrayEquations(Slices):
         name, _, rest = text.partition(".")
         return self._aliases.get(name, name) + (f".{rest}" if rest else "")
 
+    def _root(self, node: ast.expr) -> str:
+        while isinstance(node, ast.Subscript | ast.Attribute):
+            node = node.value
+        return node.id if isinstance(node, ast.Name) else ""
+
+    _partial: set[str]
+    """Names of parts of arrays: ``x`` of ``x = state.x[1:]``."""
     _aliases: dict[str, str]
     """Arrays under other names: ``x`` of ``x = state.x``."""
 
@@ -385,11 +442,6 @@ def _numbers(index: tuple[str, ...]) -> set[int] | None:
     if first < 0 or (rest and rest[1] > 10_000):
         return None
     return {first + rest[0] * k for k in range(rest[1])} if rest else {first}
-
-
-def _repeats(size: int | None) -> bool:
-    """Return whether a dimension of one element stands for all places of another's."""
-    return size == 1 and type(size) is int
 
 
 def _number(kind: type, part: ast.expr, place: ast.AST) -> ast.expr:

@@ -103,13 +103,14 @@ class CallSequence:
         except ValueError:
             return
         rows = rows_of(self._table)
+        lasts = {place: entry for entry, place in enumerate(self._places)}
+        if self.owners:
+            rows[:, OWNER] = [self.owners[place].number for place in self._places]
         for place, owner in enumerate(self.owners):
-            own = [entry for entry, whose in enumerate(self._places) if whose == place]
-            rows[own, OWNER] = owner.number
             if owner.attention is not None:
-                rows[own[-1], ATTENTION] = owner.attention.ctypes.data
+                rows[lasts[place], ATTENTION] = owner.attention.ctypes.data
             if self._now is not None and place < len(self.owners) - 1:
-                rows[own[-1], STAMP] = 8 * (self._first_stamp + place)
+                rows[lasts[place], STAMP] = 8 * (self._first_stamp + place)
         self._address = ctypes.c_size_t(self._table.ctypes.data)
         self._function = chain_function()
 

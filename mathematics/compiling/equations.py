@@ -22,14 +22,15 @@ import ast
 import copy
 import linecache
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from types import CodeType
 from typing import Any
 
-from .array_equations import ArrayEquations
+from .array_loops import ArrayLoops
 from .expressions import EquationError as EquationError  # noqa: PLC0414  also imported from here
 from .expressions import cross as cross  # noqa: PLC0414
+from .expressions import indices_of, shown
 from .kernel_registry import is_kernel, written_code
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kinds
 from .slices import Cut, counters_of
@@ -50,7 +51,8 @@ def expanded_code(function: Any, code: CodeType) -> CodeType:
     module = ast.fix_missing_locations(ast.Module([definition], []))
     compiled = compile(module, code.co_filename, "exec", dont_inherit=True)
     (made,) = (each for each in compiled.co_consts if isinstance(each, CodeType))
-    return made.replace(co_qualname=code.co_qualname, co_firstlineno=code.co_firstlineno)
+    # its own first line: the others are counted from there
+    return made.replace(co_qualname=code.co_qualname)
 
 
 def expanded_definition(function: Any, code: CodeType) -> ast.FunctionDef | None:
@@ -62,6 +64,47 @@ def expanded_definition(function: Any, code: CodeType) -> ast.FunctionDef | None
     Raises:
         EquationError: a statement cannot be rewritten.
     """
+    definition = _definition(function, code)
+    if definition is None:
+        return None
+    if function.__closure__ is None:
+        rewriter = _Rewriter(function, code.co_filename)
+        definition.body = rewriter.rewritten(definition)
+    if reports_event(function):
+        definition.args.args.append(ast.arg(EVENT))
+        none = ast.Assign([_event_place()], ast.Constant(False))
+        definition.body.insert(0, ast.copy_location(none, definition.body[0]))
+    definition.decorator_list, definition.returns = [], None
+    for argument in definition.args.args:
+        argument.annotation = None
+    return definition
+
+
+def check_equations(function: Any, kinds: Mapping[str, Kind]) -> None:
+    """Check the equations of a kernel, and of those that it calls, for arguments of known sizes.
+
+    Raises:
+        EquationError: sizes do not fit, or an index is beyond an array.
+    """
+    seen: set[str] = set()
+    pending = [(function, dict(kinds))]
+    while pending:
+        each, given = pending.pop()
+        key = f"{id(each)} {given}"
+        code = written_code(each)
+        if key in seen or each.__closure__ is not None:
+            continue
+        seen.add(key)
+        definition = _definition(each, code)
+        if definition is not None:
+            rewriter = _Rewriter(each, code.co_filename)
+            rewriter.check_with(given)
+            rewriter.rewritten(definition)
+            pending += rewriter.calls
+
+
+def _definition(function: Any, code: CodeType) -> ast.FunctionDef | None:
+    """Read the definition of a function from its file; ``None`` where there is no source."""
     import inspect  # costs a start of the command line more than all of this module
 
     # not inspect.getsourcelines: for a code object it looks through the files of all modules
@@ -73,16 +116,6 @@ def expanded_definition(function: Any, code: CodeType) -> ast.FunctionDef | None
     tree = ast.parse(textwrap.dedent("".join(inspect.getblock(lines[first - 1 :]))))
     ast.increment_lineno(tree, first - 1)
     (definition,) = (node for node in tree.body if isinstance(node, ast.FunctionDef))
-    if function.__closure__ is None:
-        rewriter = _Rewriter(function, code.co_filename)
-        definition.body = rewriter.rewritten(definition)
-    if reports_event(function):
-        definition.args.args.append(ast.arg(EVENT))
-        none = ast.Assign([_event_place()], ast.Constant(False))
-        definition.body.insert(0, ast.copy_location(none, definition.body[0]))
-    definition.decorator_list, definition.returns = [], None
-    for argument in definition.args.args:
-        argument.annotation = None
     return definition
 
 
@@ -101,7 +134,7 @@ def _event_place() -> ast.expr:
     return ast.Subscript(ast.Name(EVENT, ast.Load()), ast.Constant(0), ast.Store())
 
 
-class _Rewriter(ArrayEquations):
+class _Rewriter(ArrayLoops):
     """Rewrites the statements of one function, from the first to the last."""
 
     def __init__(self, function: Any, file: str) -> None:
@@ -110,7 +143,20 @@ class _Rewriter(ArrayEquations):
         self._products: set[str] = set()
         self._aliases: dict[str, str] = {}
         self._cuts: dict[str, Cut] = {}
+        self._partial: set[str] = set()
+        self._own: set[str] = set()
+        self._depth = 0
+        """The number of loops around the present statement."""
+        self._own_of_loops: set[str] = set()
+        self._checks = False
+        self.calls: list[tuple[Any, dict[str, Kind]]] = []
+        """The kernels that are called, with what they get; of a check only."""
         self._ahead: list[ast.stmt] | None = []
+
+    def check_with(self, kinds: Mapping[str, Kind]) -> None:
+        """Take these kinds of the arguments, and note which kernels are called with which."""
+        self._kinds.update(kinds)
+        self._checks = True
 
     # Statements
 
@@ -137,21 +183,32 @@ class _Rewriter(ArrayEquations):
         return made
 
     def _statement(self, node: ast.stmt) -> list[ast.stmt]:
-        if isinstance(node, ast.Assign) and len(node.targets) == 1:
-            return self._assign(node, node.targets[0])
-        if isinstance(node, ast.AugAssign):
-            return self._augment(node)
-        if isinstance(node, ast.For):
-            node.iter = self._expression(node.iter)
-            self._note(node.target, NUMBER)
-            node.body, node.orelse = self.body(node.body), self.body(node.orelse)
-            return [node]
         if isinstance(node, ast.While):
             self._ahead = None
-            node.test = self._expression(node.test)
+            node.test = self._expression(self._canonical(node.test))
             self._ahead = []
+            self._depth += 1
             node.body, node.orelse = self.body(node.body), self.body(node.orelse)
+            self._depth -= 1
             return [node]
+        kept = (
+            copy.deepcopy(node) if isinstance(node, ast.Assign | ast.AugAssign | ast.Expr) else None
+        )
+        for field, value in ast.iter_fields(node):
+            if isinstance(value, ast.expr) and field not in ("target", "annotation"):
+                setattr(node, field, self._canonical(value))
+        if isinstance(node, ast.Assign) and len(node.targets) > 1:
+            return self._assign_in_turn(node)
+        if isinstance(node, ast.Assign):
+            if kept is not None and self._is_foreign(node.targets[0], node.value):
+                return [kept]
+            return self._assign(node, node.targets[0])
+        if isinstance(node, ast.AugAssign):
+            if kept is not None and self._is_foreign(node.target, node.value):
+                return [kept]
+            return self._augment(node)
+        if isinstance(node, ast.For):
+            return self._for(node)
         if isinstance(node, ast.If):
             node.test = self._expression(node.test)
             node.body, node.orelse = self.body(node.body), self.body(node.orelse)
@@ -170,12 +227,74 @@ class _Rewriter(ArrayEquations):
         for field, value in ast.iter_fields(node):
             if isinstance(value, ast.expr):
                 setattr(node, field, self._expression(value))
+        for each in ast.walk(
+            node
+        ):  # what is not compiled runs in plain Python, which must be right, too
+            for name in ("body", "orelse", "finalbody"):
+                inner = getattr(each, name, None)
+                if (
+                    isinstance(inner, list)
+                    and each is not node
+                    and isinstance(each, ast.ExceptHandler | ast.match_case)
+                ):
+                    setattr(each, name, self.body(inner))
+        if isinstance(node, ast.Try | ast.With):
+            node.body = self.body(node.body)
+        if isinstance(node, ast.Try):
+            node.orelse, node.finalbody = self.body(node.orelse), self.body(node.finalbody)
         return [node]
 
+    def _is_foreign(self, target: ast.expr, value: ast.expr) -> bool:
+        """Return whether an equation has a function that makes an array, and that kernels do not know:
+        it stays as it is, for NumPy and plain Python."""
+        if not self._covers_elements(target):
+            return False
+        for each in ast.walk(value):
+            if (
+                isinstance(each, ast.Call)
+                and not self._applies_to_elements(each)
+                and not self._is_cross(each)
+            ):
+                function = self._resolved(each.func)
+                known = function is not None and (is_kernel(function) or function in _NUMBER_CALLS)
+                takes_arrays = any(map(self._is_array, each.args))
+                module = getattr(function, "__module__", "") or ""
+                if not known and (takes_arrays or module.startswith("numpy")):
+                    return True
+        return False
+
+    def _assign_in_turn(self, node: ast.Assign) -> list[ast.stmt]:
+        """Write ``a = b = value``, the targets one after the other."""
+        made: list[ast.stmt] = []
+        value = node.value
+        if not isinstance(value, ast.Name | ast.Constant | ast.Attribute):
+            if self._is_array(value):
+                value = self._new_array(value)
+            else:
+                value = self._kept("number", self._expression(value), node)
+        for target in node.targets:
+            plain = ast.copy_location(ast.Assign([target], copy.deepcopy(value)), node)
+            made += self._assign(plain, target)
+        return made
+
     def _assign(self, node: ast.Assign, target: ast.expr) -> list[ast.stmt]:
+        mask = self._mask_of(target)
+        if mask is not None:
+            assert isinstance(target, ast.Subscript)
+            return self._masked(node, target, self._canonical(mask), node.value)
         if self._covers_elements(target):
             return self._loops(node, target, node.value)
         value = node.value
+        if isinstance(target, ast.Subscript) and self._is_array(target):
+            # A[0] = ... writes a row
+            kind = self._kind(target)
+            assert isinstance(kind, ArrayKind)
+            whole = ast.Tuple([*indices_of(target), *[ast.Slice() for _ in kind.shape]], ast.Load())
+            return self._loops(
+                node,
+                ast.copy_location(ast.Subscript(target.value, whole, ast.Store()), node),
+                value,
+            )
         if (
             isinstance(target, ast.Tuple)
             and isinstance(value, ast.Tuple)
@@ -188,6 +307,8 @@ class _Rewriter(ArrayEquations):
             value.elts = [self._reference(each) for each in value.elts]
             target.elts = [self._target(each) for each in target.elts]
             return [node]
+        if isinstance(target, ast.Name):
+            self._note_alias(node, target.id, value)
         self._note(target, self._kind(value))
         node.value = (
             self._reference(value) if isinstance(target, ast.Name) else self._expression(value)
@@ -195,11 +316,54 @@ class _Rewriter(ArrayEquations):
         node.targets = [self._target(target)]
         return [node]
 
+    def _note_alias(self, node: ast.Assign, name: str, value: ast.expr) -> None:
+        """Note that a name stands for an array, or a part of one."""
+        self._aliases.pop(name, None)
+        self._partial.discard(name)
+        self._own_of_loops.discard(name)
+        if not self._is_array(value):
+            return
+        if not isinstance(value, ast.Name | ast.Attribute | ast.Subscript):
+            if self._depth and not self._chooses(value):
+                self._own_of_loops.add(name)
+            return
+        if isinstance(value, ast.Name) and value.id in self._own_of_loops:
+            text = f"{name} would keep an array that the loop makes anew; make both before the loop"
+            raise self._error(node, text)
+        if isinstance(value, ast.Name) and value.id in self._own and self._depth:
+            self._own_of_loops.add(name)
+        path = self._path(value)
+        if path and path != name:
+            self._aliases[name] = path
+            if (
+                isinstance(value, ast.Subscript)
+                or self._root(value) in self._partial
+                or (isinstance(value, ast.Attribute) and value.attr == "T")
+            ):
+                self._partial.add(name)
+
     def _augment(self, node: ast.AugAssign) -> list[ast.stmt]:
-        if self._covers_elements(node.target):
-            left = copy.deepcopy(node.target)
+        mask = self._mask_of(node.target)
+        if mask is not None:
+            assert isinstance(node.target, ast.Subscript)
+            mask = self._canonical(mask)
+            sum_ = ast.copy_location(
+                ast.BinOp(_loaded(copy.deepcopy(node.target)), node.op, node.value), node
+            )
+            return self._masked(node, node.target, mask, sum_)
+        if isinstance(node.target, ast.Name | ast.Attribute | ast.Subscript) and self._is_array(
+            node.target
+        ):
+            kind, target = self._kind(node.target), node.target
+            assert isinstance(kind, ArrayKind)
+            if not self._covers_elements(target):  # x += 1.0 of a whole array
+                own = indices_of(target) if isinstance(target, ast.Subscript) else []
+                base = target.value if isinstance(target, ast.Subscript) else _loaded(target)
+                whole = ast.Tuple([*own, *[ast.Slice() for _ in kind.shape]], ast.Load())
+                target = ast.copy_location(ast.Subscript(base, whole, ast.Store()), node)
+            left = copy.deepcopy(target)
             sum_ = ast.copy_location(ast.BinOp(_loaded(left), node.op, node.value), node)
-            return self._loops(node, node.target, sum_)
+            return self._loops(node, target, sum_)
         node.value = self._expression(node.value)
         element = self._element_type(node.target)
         if element is not None and not isinstance(node.target, ast.Name):
@@ -242,8 +406,17 @@ class _Rewriter(ArrayEquations):
             return self._read(node, element)
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult):
             if isinstance(self._kind(node), NumberKind):
+                node = self._without_cross(node)
+                assert isinstance(node, ast.BinOp)
                 return self._sum(node, [])
             raise self._error(node, "a product with @ is an array: assign it, as in out[:] = R @ v")
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+            self._children(node, self._expression)
+            return self._power(node)
+        if isinstance(node, ast.NamedExpr):
+            self._note(node.target, self._kind(node.value))
+            node.value = self._expression(node.value)
+            return node
         if isinstance(node, ast.Compare):
             self._replace_words(node)
         if isinstance(node, ast.Call):
@@ -268,11 +441,13 @@ class _Rewriter(ArrayEquations):
             if isinstance(kind, ArrayKind) and kind.rank == 0:
                 return self._expression(node)
             return self._inside(node)
-        if isinstance(kind, ArrayKind) and kind.rank and not isinstance(node, ast.IfExp):
-            raise self._error(
-                node, "this makes a new array: assign it into one, as in scratch.x[:] = ..."
-            )
+        if isinstance(kind, ArrayKind) and kind.rank and not self._chooses(node):
+            return self._new_array(node)
         return self._expression(node)
+
+    def _chooses(self, node: ast.expr) -> bool:
+        """Return whether an expression hands on one of two arrays: ``a if flag else b``."""
+        return isinstance(node, ast.IfExp) and not self._is_array(node.test)
 
     def _inside(self, node: ast.expr) -> ast.expr:
         """Rewrite the array that a part is taken of: only its indices are numbers."""
@@ -299,11 +474,41 @@ class _Rewriter(ArrayEquations):
             and not isinstance(function, type)
         ) and is_kernel(function):
             kinds = list(argument_kinds(function).values())
+            node.args = self._by_position(node, function)
+            node.keywords = []
+            if self._checks:
+                self._note_call(node, function)
         node.args = [
             self._argument(each, kind)
             for each, kind in zip(node.args, [*kinds, *[NUMBER] * len(node.args)], strict=False)
         ]
         return node
+
+    def _note_call(self, node: ast.Call, function: Any) -> None:
+        """Note what a kernel gets, where its own declarations are no wiser."""
+        kinds: dict[str, Kind] = {}
+        for (name, declared), each in zip(
+            argument_kinds(function).items(), node.args, strict=False
+        ):
+            given = self._kind(each)
+            if isinstance(declared, ArrayKind) and isinstance(given, ArrayKind):
+                if declared.rank != given.rank and given.rank:
+                    text = f"{function.__qualname__} takes {name} of {declared.rank} dimensions, and gets {given.rank}"
+                    raise self._error(node, text)
+                pairs = zip(declared.shape, given.shape, strict=False)
+                for size, found in pairs:
+                    if None not in (size, found) and size != found:
+                        text = f"{function.__qualname__} takes {name} of shape {shown(declared.shape)}, and gets {shown(given.shape)}"
+                        raise self._error(node, text)
+                if declared.rank == given.rank:
+                    shape = tuple(
+                        found if size is None else size
+                        for size, found in zip(declared.shape, given.shape, strict=True)
+                    )
+                    kinds[name] = declared._replace(shape=shape)
+            elif isinstance(declared, RecordKind) and isinstance(given, RecordKind):
+                kinds[name] = given
+        self.calls.append((function, kinds))
 
     def _argument(self, node: ast.expr, wanted: Kind) -> ast.expr:
         """Rewrite an argument of a call; a kernel may take a scalar field as the array that it
@@ -370,3 +575,6 @@ def _called(name: str, argument: ast.expr, place: ast.AST) -> ast.expr:
     for each in (call, call.func):
         ast.copy_location(each, place)
     return call
+
+
+_NUMBER_CALLS = {float, int, bool, abs, min, max, len, round, range}

@@ -7,6 +7,8 @@ import copy
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from ..arrays import Array
 from .kernel_registry import written_code
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kinds
@@ -49,7 +51,7 @@ class Expressions:
     def _kind(self, node: ast.expr) -> Kind:
         """Find the kind of an expression, as far as it follows from the arguments."""
         if isinstance(node, ast.Name):
-            return self._kinds.get(node.id)
+            return self._kinds[node.id] if node.id in self._kinds else self._kind_outside(node.id)
         if isinstance(node, ast.Attribute):
             whole = self._kind(node.value)
             if isinstance(whole, RecordKind):
@@ -84,10 +86,37 @@ class Expressions:
         if isinstance(node, ast.Call):
             if self._is_cross(node):
                 return ArrayKind((3,))
+            if isinstance(node.func, ast.Name) and node.func.id == "<outer>":
+                a, b = (self._kind(each) for each in node.args)
+                assert isinstance(a, ArrayKind) and isinstance(b, ArrayKind)
+                return ArrayKind((a.shape[0], b.shape[0]))
             if self._applies_to_elements(node):
-                return self._joined(node, node.args)
+                return self._joined(node, node.args, self._element_of(node))
             return NUMBER
         return NUMBER if isinstance(node, ast.Constant) else None
+
+    def _kind_outside(self, name: str) -> Kind:
+        """Find the kind of a constant array, or a number, of the module."""
+        value = None if name in self._locals else self._scope.get(name)
+        if isinstance(value, np.ndarray) and value.dtype.name in _ELEMENTS:
+            return ArrayKind(value.shape, _ELEMENTS[value.dtype.name])
+        return NUMBER if isinstance(value, bool | int | float) else None
+
+    def _element_of(self, node: ast.Call) -> type | None:
+        """Return the type that a function of numbers answers with; None where it is that of its
+        arguments."""
+        function = node.func
+        if isinstance(function, ast.Name):
+            return {"float": float, "int": int, "bool": bool, "round": int, "abs": None, "min": None,
+                    "max": None}.get(function.id, float)  # fmt: skip
+        assert isinstance(function, ast.Attribute)
+        if isinstance(function.value, ast.Name) and function.value.id == "math":
+            return (
+                int
+                if function.attr in ("floor", "ceil", "trunc")
+                else (bool if function.attr.startswith("is") else float)
+            )
+        return bool if function.attr in FLAGS else None if function.attr in KEEPING else float
 
     def _joined(
         self, node: ast.expr, parts: Sequence[ast.expr], element: type | None = None
@@ -117,9 +146,9 @@ class Expressions:
         for one, other in zip(
             (*[1] * (rank - len(a)), *a), (*[1] * (rank - len(b)), *b), strict=True
         ):
-            if None not in (one, other) and one != other and 1 not in (one, other):
+            if None not in (one, other) and one != other and not (repeats(one) or repeats(other)):
                 raise self._error(node, f"shapes {shown(a)} and {shown(b)} do not fit together")
-            made.append(other if one == 1 or one is None else one)
+            made.append(other if repeats(one) or one is None else one)
         return tuple(made)
 
     def _without_number(self, node: ast.expr) -> Kind:
@@ -144,7 +173,13 @@ class Expressions:
         return ArrayKind(tuple(shape), whole.element) if shape else NUMBER
 
     def _check_index(self, node: ast.Subscript, index: ast.expr, size: int | None, k: int) -> None:
-        """Refuse an index that is always beyond an array."""
+        """Refuse an index that is always beyond an array, and one that is an array."""
+        kind = self._kind(index)
+        if isinstance(kind, ArrayKind) and kind.rank:
+            text = f"{ast.unparse(node)}: an index is a number; write a loop"
+            if kind.element is bool:
+                text = f"{ast.unparse(node)}: a mask selects elements in y[mask] = ...; for others write a loop, or np.where"
+            raise self._error(node, text)
         place = self._constant_of(index)
         if place is None or size is None or -size <= place < size:
             return
@@ -205,14 +240,28 @@ class Expressions:
         return isinstance(self._kind(target.value), ArrayKind)
 
     def _is_cross(self, node: ast.Call) -> bool:
-        return isinstance(node.func, ast.Name) and self._scope.get(node.func.id) is cross
+        found = self._resolved(node.func)
+        return found is cross or (found is np.cross and not node.keywords)
+
+    def _resolved(self, node: ast.expr) -> Any:
+        """Return the function of the module, or of a module that it imports; else ``None``."""
+        if isinstance(node, ast.Name):
+            if node.id in self._locals:
+                return None
+            builtins = self._scope.get("__builtins__", {})
+            builtins = builtins if isinstance(builtins, dict) else vars(builtins)
+            return self._scope.get(node.id, builtins.get(node.id))
+        if isinstance(node, ast.Attribute):
+            owner = self._resolved(node.value)
+            return getattr(owner, node.attr, None) if owner is not None else None
+        return None
 
     def _applies_to_elements(self, node: ast.Call) -> bool:
         """Return whether a call is of a function of numbers, which an equation applies to each
         element."""
         name = node.func
         if isinstance(name, ast.Attribute):
-            return isinstance(name.value, ast.Name) and name.value.id == "math"
+            return isinstance(name.value, ast.Name) and name.value.id in ("math", NUMBERS)
         if not isinstance(name, ast.Name):
             return False
         if name.id in ("float", "int", "bool", "abs", "min", "max", "round"):
@@ -275,6 +324,12 @@ def is_slice(index: ast.expr) -> bool:
     return isinstance(index, ast.Slice) or hasattr(index, "length")
 
 
+def repeats(size: int | None) -> bool:
+    """Return whether a dimension of one element stands for all places of another's; one whose size
+    only a call tells is not repeated."""
+    return size == 1 and type(size) is int
+
+
 def shown(shape: Sequence[int | None]) -> str:
     """Return a shape as text."""
     sizes = ["?" if size is None else str(int(size)) for size in shape]
@@ -282,3 +337,10 @@ def shown(shape: Sequence[int | None]) -> str:
 
 
 _WIDTHS = (bool, int, float)
+_ELEMENTS: Mapping[str, type] = {"float64": float, "int64": int, "bool": bool}
+FLAGS = ("isnan", "isfinite", "isinf")
+"""NumPy's functions of a number that answer with a flag."""
+KEEPING = ("maximum", "minimum", "clip", "sign")
+"""Those that answer with a whole number for whole numbers."""
+NUMBERS = "__aloft_numbers__"
+"""Name in a kernel's module under which ``numpy_numbers`` stands for rewritten code."""

@@ -16,6 +16,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .arguments import ArgumentType
 from .equations import VERSION, reports_event
 from .kernel_registry import is_kernel, written_code
@@ -41,7 +43,7 @@ def fingerprint(
         OSError: a source file cannot be read, with ``by_source``.
     """
     digest = hashlib.blake2b(digest_size=16)
-    digest.update(f"{tools}; equations {VERSION}".encode())
+    digest.update(f"{tools}; equations {VERSION}; {_numbers_digest()}".encode())
     for part in signature:
         digest.update(f"|{part}".encode())
     functions = closure(kernel)
@@ -97,8 +99,26 @@ def _texts(function: Any, by_source: bool) -> Iterator[str]:
             if isinstance(value, type) and issubclass(value, IntEnum):
                 yield f"|{name}={[(member.name, int(member)) for member in value]}"
                 continue
+            if type(value).__module__.startswith("numba."):
+                from .numba_calls import is_numba, source_of
+
+                if is_numba(value):
+                    yield f"|{name}={source_of(value)}"
+                    continue
+            if isinstance(value, np.ndarray):  # whose text leaves elements out
+                digest = hashlib.blake2b(np.ascontiguousarray(value).tobytes(), digest_size=16)
+                yield f"|{name}={value.dtype}{value.shape}{digest.hexdigest()}"
+                continue
             plain = isinstance(value, types.ModuleType | type) or callable(value)
             yield f"|{name}={getattr(value, '__name__', '') if plain else repr(value)}"
+
+
+@cache
+def _numbers_digest() -> str:
+    """Return the digest of what rewritten equations may call."""
+    folder = Path(__file__).parent
+    files = folder / "numpy_numbers.py", folder.parent / "elementary.py"
+    return " ".join(file_digest(str(file)) for file in files)
 
 
 @cache

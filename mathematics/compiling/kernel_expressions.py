@@ -13,7 +13,7 @@ import numpy as np
 
 from .arguments import ArgumentType, RecordType
 from .array_code import SIZE_BITS, FunctionCode
-from .failures import Site
+from .failures import Failure, Site
 from .known_functions import ELEMENTWISE, FUNCTIONS, write_elements, write_product
 from .llvm_code import (
     BOOL,
@@ -98,6 +98,10 @@ class ExpressionTranslator:
         self._assigned, self._only_counters = _assignments(tree)
         self._local = self._assigned | {each.arg for each in tree.args.args}
 
+    def _assign_name(self, name: str, value: Value) -> None:
+        """Write a variable."""
+        raise NotImplementedError
+
     def _value(self, node: ast.expr) -> Value:
         with self._placed(node):
             return self._expression(node)
@@ -137,6 +141,10 @@ class ExpressionTranslator:
                 return self._flag(node)
             case ast.IfExp():
                 return self._choice(node)
+            case ast.NamedExpr():
+                value = self._value(node.value)
+                self._assign_name(node.target.id, value)
+                return value
             case ast.Call():
                 return self._call(node)
             case _:
@@ -147,6 +155,8 @@ class ExpressionTranslator:
             return tuple_of([self._constant(each) for each in value])
         if isinstance(value, bool | int | float | np.number | np.bool_):
             return number(value)  # type: ignore[arg-type]  # a number of NumPy is one, too
+        if isinstance(value, np.ndarray) and value.dtype.name in ("float64", "int64", "bool"):
+            return self._code.constant_array(value)
         raise NotCompilable(f"{value!r} is no number"[:200])
 
     def _read_name(self, name: str) -> Value:
@@ -316,6 +326,11 @@ class ExpressionTranslator:
         if not self._is_outer(node.func):
             raise NotCompilable(f"{ast.unparse(node.func)} is {_NOT_CALLED}")
         function = self._outer(node.func)
+        if (
+            getattr(function, "__module__", "").endswith(".compiling.numpy_numbers")
+            and function.__name__ == "room"
+        ):
+            return self._room(node)
         arguments = [self._value(each) for each in node.args]
         try:
             if function in FUNCTIONS:
@@ -335,9 +350,15 @@ class ExpressionTranslator:
             raise NotCompilable(f"{ast.unparse(node.func)} is {_NOT_CALLED}")
         return self._call_kernel(made, arguments)
 
+    def _room(self, node: ast.Call) -> Value:
+        """Make an array of the kernel's own, of zeros."""
+        shape, dtype = (ast.literal_eval(each) for each in node.args)
+        return self._code.room(shape, dtype)
+
     def _call_kernel(self, made: Translated, arguments: Sequence[Value]) -> Value:
         code = self._code
-        self._callees[made.name] = made
+        if made.text:
+            self._callees[made.name] = made
         results = code.variable(made.returns)
         operands = [
             f"{leaf} {part}"
@@ -346,7 +367,10 @@ class ExpressionTranslator:
         ]
         operands += [f"ptr {place}" for place in results]
         status = code.result(f'call i32 @"{made.name}"({", ".join(operands)})')
-        if made.fails:
+        if not made.text:  # of numba
+            code.fail_if(code.result(f"icmp ne i32 {status}, 0"), Failure.NUMBA)
+            self._code.declared |= made.declared
+        elif made.fails:
             code.pass_on(status)
         return code.load(made.returns, results) if results else NOTHING
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from functools import cache
+from importlib import import_module
 from importlib.metadata import version
 from itertools import count
 from typing import Any
@@ -179,6 +181,47 @@ def assemble(assembly: str) -> bytes:
     return code
 
 
+def object_of(assembly: str, name: str, symbol: str) -> tuple[bytes, list[str]]:
+    """Return the object file of a module that Numba has optimised, with one of its functions under
+    another name, and the names of what it needs from outside."""
+    module = _binding().parse_assembly(assembly)
+    module.get_function(name).name = symbol
+    needs = [
+        each.name for each in (*module.functions, *module.global_variables)
+        if each.is_declaration and not each.name.startswith("llvm.")
+    ]  # fmt: skip
+    code: bytes = target_machine().emit_object(module)
+    return code, needs
+
+
+def linked(code: bytes, symbol: str, needs: Mapping[str, int]) -> Any:
+    """Link an object file with functions at some addresses; the library gives the address of its
+    ``symbol``.
+
+    Raises:
+        RuntimeError: the object file is damaged, or of another kind.
+    """
+    library = _binding().JITLibraryBuilder().add_object_img(code).add_current_process()
+    for name, address in needs.items():
+        library = library.import_symbol(name, address)
+    return library.export_symbol(symbol).link(_linker(), f"kernel{next(_numbers)}")
+
+
+_NUMBA = re.compile(rb"numba_[0-9a-f]{32}")
+
+
+def _called_of_numba(code: bytes) -> dict[str, int]:
+    """Find the functions of Numba that an object file calls. Raises ``ValueError`` where one is not
+    kept any more."""
+    names = {each.decode() for each in _NUMBA.findall(code)}
+    if not names:
+        return {}
+    found = import_module(
+        f"{__package__}.numba_calls"
+    )  # which needs this file, and is rarely needed
+    return {name: found.address_of(name) for name in names}
+
+
 class MachineCode:
     """The function in an object file, ready to be called with the address of packed arguments.
 
@@ -187,10 +230,8 @@ class MachineCode:
     """
 
     def __init__(self, code: bytes) -> None:
-        binding = _binding()
-        library = binding.JITLibraryBuilder().add_object_img(code).add_current_process()
         # kept, because the code goes with it; one linker for all takes a third of the time of one each
-        self._loaded: Any = library.export_symbol(ENTRY).link(_linker(), f"kernel{next(_numbers)}")
+        self._loaded: Any = linked(code, ENTRY, _called_of_numba(code))
         self.address: int = self._loaded[ENTRY]
         if not self.address:
             raise ValueError(f"the machine code has no function {ENTRY}")

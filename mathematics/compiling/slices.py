@@ -92,6 +92,10 @@ class Slices(Expressions):
             part.upper is None or upper is not None
         )
         if known and size is not None:
+            most = max(b for b in (lower, upper, 0) if b is not None)
+            if type(size) is not int and step == 1 and most > size:
+                text = f"{ast.unparse(node)} reaches beyond {ast.unparse(node.value)}, which has {int(size)} elements"
+                raise self._error(node, text)
             places = range(*slice(lower, upper, step).indices(size))
             cut = Cut(ast.Constant(places.start), step, ast.Constant(len(places)))
         else:
@@ -208,6 +212,12 @@ class Slices(Expressions):
                     if isinstance(node.op, ast.Sub)
                     else a * b
                 )
+            case ast.Call(func=ast.Name(id="len"), args=[array]):
+                return self._known_size(array, 0)
+            case ast.Subscript(
+                value=ast.Attribute(attr="shape"), slice=ast.Constant(value=int() as k)
+            ):
+                return self._known_size(node.value.value, k)  # type: ignore[attr-defined]  # an attribute
             case ast.Name() if node.id not in self._locals:
                 found = self._scope.get(node.id)
                 return (
@@ -221,6 +231,12 @@ class Slices(Expressions):
                     and node.attr in kind.__members__
                 ):
                     return int(kind[node.attr])
+        return None
+
+    def _known_size(self, array: ast.expr, dimension: int) -> int | None:
+        kind = self._kind(array)
+        if isinstance(kind, ArrayKind) and dimension < kind.rank:
+            return kind.shape[dimension]
         return None
 
     def _is_count(self, node: ast.expr) -> bool:
@@ -258,7 +274,11 @@ def counters_of(definition: ast.FunctionDef) -> set[str]:
 
     plain: set[int] = set()
     for node in ast.walk(definition):
-        if isinstance(node, ast.For) and isinstance(node.target, ast.Name):
+        if isinstance(node, ast.For) and _is_enumerate(node):
+            assert isinstance(node.target, ast.Tuple)
+            plain.add(id(node.target.elts[0]))
+            bind(node.target.elts[0], lambda _: True)
+        elif isinstance(node, ast.For) and isinstance(node.target, ast.Name):
             plain.add(id(node.target))
             bind(node.target, lambda names, loop=node.iter: _counts_up(loop, names))  # type: ignore[misc]
         elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
@@ -273,6 +293,10 @@ def counters_of(definition: ast.FunctionDef) -> set[str]:
         if kept == names:
             return names
         names = kept
+
+
+def _is_enumerate(node: ast.For) -> bool:
+    return isinstance(node.target, ast.Tuple) and ast.unparse(node.iter).startswith("enumerate(")
 
 
 def _counts_up(loop: ast.expr, names: set[str]) -> bool:

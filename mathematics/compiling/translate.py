@@ -26,6 +26,8 @@ class Translator:
     def __init__(self) -> None:
         self._translated: dict[tuple[int, tuple[ArgumentType, ...]], Translated] = {}
         self._definitions: dict[int, Any] = {}
+        self._open: set[tuple[int, tuple[ArgumentType, ...]]] = set()
+        """What is being translated at present."""
 
     def object_code(self, kernel: Callable[..., Any], signature: tuple[ArgumentType, ...]) -> bytes:
         """Return the object file of ``kernel`` for arguments of these types.
@@ -74,12 +76,21 @@ class Translator:
         """
         place = (status >> 4 & 255) - 1
         for each in _closure([self._translate(kernel, signature)]):
-            if origin_of(each.function) == status >> 12 and 0 <= place < len(each.sites):
+            if (
+                each.text
+                and origin_of(each.function) == status >> 12
+                and 0 <= place < len(each.sites)
+            ):
                 return each.function, each.sites[place]
         return None
 
     def _translate(self, kernel: Any, signature: tuple[ArgumentType, ...]) -> Translated:
         key = id(kernel), signature
+        if key in self._open:
+            raise CompileError(
+                f"kernel {kernel.__module__}.{kernel.__qualname__} calls itself; write a loop, or an "
+                "@numba.njit function, which kernels may call"
+            )
         if key not in self._translated:
             if id(kernel) not in self._definitions:
                 self._definitions[id(kernel)] = expanded_definition(kernel, written_code(kernel))
@@ -88,11 +99,21 @@ class Translator:
             if tree is None:
                 raise CompileError(f"kernel {name} does not compile: its source is not in a file")
             name = f"{name}#{len(self._translated)}"
-            self._translated[key] = translate(kernel, tree, signature, name, self._callee)
+            self._open.add(key)
+            try:
+                self._translated[key] = translate(kernel, tree, signature, name, self._callee)
+            finally:
+                self._open.discard(key)
         return self._translated[key]
 
     def _callee(self, function: Any, signature: tuple[ArgumentType, ...]) -> Translated | None:
-        return self._translate(function, signature) if is_kernel(function) else None
+        if is_kernel(function):
+            return self._translate(function, signature)
+        if type(function).__module__.startswith("numba."):
+            from .numba_calls import is_numba, numba_function
+
+            return numba_function(function, signature) if is_numba(function) else None
+        return None
 
 
 def _with_callees(made: Sequence[Translated]) -> str:

@@ -97,8 +97,8 @@ def variables_near(problem: SimpleProblem, plan: PlannedJump) -> Array:
         start = int(problem.assembly.state_start[k])
         position = at(plan.position, time)
         position[3:7] /= np.linalg.norm(position[3:7])
-        part = min(int(np.searchsorted(mine[1:], grid.times[k], side="right")), 2)
-        rate = stretch[part]
+        piece = min(int(np.searchsorted(mine[1:], grid.times[k], side="right")), 2)
+        rate = stretch[piece]
         speed = rate * at(plan.com_velocity, time)
         state = np.concatenate(
             [position, at(plan.com, time), speed, at(plan.angular_momentum, time)]
@@ -112,8 +112,8 @@ def variables_near(problem: SimpleProblem, plan: PlannedJump) -> Array:
         values = [rate * at(velocity, later), gain]
         if grid.phases[k] is not Phase.FLIGHT:
             values.append(at(force, 0.5 * (time + later)))
-        values = np.concatenate(values)
-        found[control : control + len(values)] = values
+        controls = np.concatenate(values)
+        found[control : control + len(controls)] = controls
     return np.clip(found, problem.lower, problem.upper)
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 from ...runtime.language.parameters import Parameters, parameter
 
-if TYPE_CHECKING:
-    from .task import JumpTask
+Task = TypeVar("Task", bound=Parameters)
+"""A ``JumpTask``; its module imports this one."""
 
 
 class BoundarySet(Parameters):
@@ -47,7 +47,7 @@ UNSUPPORTED: dict[str, tuple[str, ...]] = {
 """Keys of a task that a formulation has nothing for, by the formulation."""
 
 
-def unsupported_keys(task: JumpTask) -> Iterator[str]:
+def unsupported_keys(task: Any) -> Iterator[str]:
     """Yield the keys that the task sets, to something else than their default, and its formulation has nothing for."""
     for key in UNSUPPORTED[task.formulation]:
         group, _, name = key.rpartition(".")
@@ -58,7 +58,7 @@ def unsupported_keys(task: JumpTask) -> Iterator[str]:
             yield key
 
 
-def in_formulation(task: JumpTask, formulation: str) -> tuple[JumpTask, list[str]]:
+def in_formulation(task: Task, formulation: str) -> tuple[Task, list[str]]:
     """Return the task in another formulation, without the keys that it has nothing for, and these keys."""
     found = task.model_copy(update={"formulation": formulation})
     left_out = list(unsupported_keys(found))

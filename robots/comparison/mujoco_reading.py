@@ -9,8 +9,8 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
-from ..importing.build import LIGHTEST
-from ..importing.build import SPLIT as SPLIT_SHARE
+from ..importing.build import SHARE as LIGHT_SHARE
+from ..importing.build import split_share
 from ..importing.inertials import mujoco_remarks
 from ..importing.raw_model import Reference
 from .differences import SAME, Differences, tensor, together
@@ -80,6 +80,7 @@ def _set_aside(ours: FileRobot, reference: Reference, model: Any, found: Differe
     model.opt.disableflags &= ~int(flags.mjDSBL_GRAVITY)
     model.opt.gravity = [0.0, 0.0, -GRAVITY]
     model.opt.density = model.opt.viscosity = 0.0
+    model.actuator_delay[:], model.actuator_history[:, 0] = 0.0, 0
     for name in ("tendon_armature", "tendon_damping", "tendon_stiffness"):
         getattr(model, name)[:] = 0.0
     for name in reference.stand_ins:
@@ -179,8 +180,8 @@ def _compare_links(ours: FileRobot, state: _State, found: Differences) -> float:
     for body in ours.model.bodies.values():
         carried = [j for j in built.joints if j["name"] in {each.name for each in body.joints}]
         for joint in carried[:-1]:
-            light = SPLIT_SHARE * body.inertial.mass <= LIGHTEST
-            share = LENT if light else max(share, SPLIT)
+            lent = LENT if split_share(body.inertial) == LIGHT_SHARE else SPLIT
+            share = max(share, lent)
             pieces.add(joint["child"])
             join(joint["child"], carried[-1]["child"])
     if pieces:
@@ -297,10 +298,17 @@ def _torques(state: _State) -> dict[int, float]:
     import mujoco
 
     model, data = state.model, state.data
+    # The range of a servo's control is where it goes, and says nothing of its torque.
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
+    limited = np.array(model.actuator_ctrllimited, dtype=bool)
+    for a in range(model.nactuator):
+        first, count = int(model.actuator_ctrladr[a]), int(model.actuator_ctrlnum[a])
+        if int(model.actuator_biastype[a]) != int(mujoco.mjtBias.mjBIAS_NONE):
+            limited[first : first + count] = False
     given = []
     for sign in (1.0, -1.0):
         limits = model.actuator_ctrlrange[:, 1 if sign > 0 else 0]
-        data.ctrl[:] = np.where(model.actuator_ctrllimited, limits, sign * FAR)
+        data.ctrl[:] = np.where(limited, limits, sign * FAR)
         data.act[:] = sign * FAR
         for a in range(model.nactuator):
             rows = slice(

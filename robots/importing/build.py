@@ -29,8 +29,15 @@ SHARE = 1e-3
 """Share of what it carries that a link without mass has."""
 SPLIT = 1e-6
 """Share of a body with several joints that each of its links but the last has; of light ones ``SHARE``."""
-LIGHTEST = 1e-11
-"""The least mass [kg] of such a link, with which simulators compute."""
+LIGHTEST, ROUNDEST = 1e-11, 1e-12
+"""The least mass [kg] and inertia [kg m^2] of such a link, with which simulators compute."""
+
+
+def split_share(body: Inertial) -> float:
+    """Return the share of a body with several joints that each of its links but the last has."""
+    least = float(np.linalg.eigvalsh(body.inertia)[0])
+    heavy = SPLIT * body.mass > LIGHTEST and SPLIT * least > ROUNDEST
+    return SPLIT if heavy else SHARE
 
 
 @dataclass(frozen=True)
@@ -110,7 +117,7 @@ def build(model: RawModel, welded: Collection[str] = (), base_joint: str = "") -
             beside.append(body.name)
             continue
         moving = [joint for joint in body.joints if joint.name not in still]
-        share = SPLIT if SPLIT * body.inertial.mass > LIGHTEST else SHARE
+        share = split_share(body.inertial) if len(moving) > 1 else 0.0
         rotation, position = turn.T @ body.rotation, turn.T @ (body.position - place)
         carrier = links[frames[parent].link]
         for k, joint in enumerate(moving):

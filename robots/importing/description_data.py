@@ -81,11 +81,11 @@ class Overlay:
         """Return the joints that ``weld`` names, by name or shell pattern."""
         found: list[str] = []
         given = self.data.get("weld", [])
-        if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
+        if not isinstance(given, list) or not all(isinstance(each, (str, int)) for each in given):
             self.add(("weld",), f"weld cannot be {shown(given)}", "a list of joints or patterns",
                      shown(given))  # fmt: skip
             return []
-        for k, pattern in enumerate(given):
+        for k, pattern in enumerate(map(str, given)):
             matching = [name for name in joints if fnmatchcase(name, pattern)]
             if not matching:
                 self.add(("weld", k), f"weld: the file has no joint {pattern}", listing(joints),
@@ -119,8 +119,8 @@ class Overlay:
 
     def frame(self, path: tuple[str | int, ...], name: Any, built: LinkTree) -> BodyFrame | None:
         """Return the body of the file with that name; ``None``, and a fault, if there is none."""
-        if isinstance(name, str) and name in built.frames:
-            return built.frames[name]
+        if isinstance(name, (str, int)) and str(name) in built.frames:  # YAML reads 2 as a number
+            return built.frames[str(name)]
         self.add(path, f"the file has no link {shown(name)}", listing(list(built.frames), 60),
                  shown(name), nearest(str(name), built.frames))  # fmt: skip
         return None
@@ -224,6 +224,7 @@ class Overlay:
         links = [link["name"] for link in built.links]
         for name, value in found.items():
             at = value.get("link") if isinstance(value, Mapping) else None
+            at = str(at) if isinstance(at, int) else at
             if at is None or (at in links and at not in built.frames):
                 continue
             frame = self.frame(("thrusters", name, "link"), at, built)
@@ -468,10 +469,19 @@ def import_robot(path: Path, added: Mapping[str, Any], model: RawModel | None = 
     for key in ("profile", "sensors", "standing", "held", "supply", "looks"):
         if key in added:
             data[key] = added[key]
+    if isinstance(data["sensors"], Mapping):
+        data["sensors"] = {name: _with_text(each) for name, each in data["sensors"].items()}
     if thrusters := overlay.thrusters(built, model):
         data["thrusters"] = thrusters
     _stand_within_limits(data)
     return Imported(data, overlay.errors, notes, model, built, unchanged)
+
+
+def _with_text(mount: Any) -> Any:
+    """Return a mounted sensor whose link is a text, where a link is called by a number."""
+    if isinstance(mount, Mapping) and type(mount.get("link")) is int:
+        return {**mount, "link": str(mount["link"])}
+    return mount
 
 
 ROUNDED = 1e-3

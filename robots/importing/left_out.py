@@ -15,6 +15,7 @@ import numpy as np
 
 from ...files.problems import listing
 from ...mathematics.constants import GRAVITY
+from .actuators import control_range, force_range, gear
 
 FRICTION = (1.0, 0.005, 0.0001)
 """Sliding, torsional and rolling friction where a file gives none."""
@@ -29,9 +30,9 @@ def left_out(model: Any, spec: Any) -> Iterator[str]:
     yield from _contacts(model)
     yield from _joints(model)
     yield from _servos(model)
+    yield from _sensors(model)
     yield from _tied(model, spec)
-    if abs(float(np.linalg.norm(model.opt.gravity)) - GRAVITY) > 0.02:
-        yield f"left out: a gravity of {_numbers(model.opt.gravity)} m/s^2; gravity is {GRAVITY:g} m/s^2 downwards"
+    yield from _medium(model)
 
 
 def _contacts(model: Any) -> Iterator[str]:
@@ -68,17 +69,29 @@ def _contacts(model: Any) -> Iterator[str]:
         )
     if solimp:
         yield f"left out: impedance of contacts, solimp {solimp}; it is the simulator's own for all"
-    margin = given(model.geom_margin[:, None], (0.0,))
-    if margin:
-        yield f"left out: contact margin {margin}; contacts begin where shapes touch"
+    for values, called, instead in (
+        (model.geom_margin[:, None], "contact margin", "contacts begin where shapes touch"),
+        (model.geom_gap[:, None], "contact gap", "contacts begin where shapes touch"),
+        (model.geom_adhesion[:, None], "adhesion", "contacts here only push"),
+        (model.geom_surfacevel, "surface velocity", "surfaces here stand still on their links"),
+    ):
+        found = given(values, (0.0,) * values.shape[1])
+        if found:
+            yield f"left out: {called} {found}; {instead}"
 
 
 def _joints(model: Any) -> Iterator[str]:
     """Yield the springs and damping that grows with speed."""
     names = [model.joint(j).name for j in range(model.njnt)]
-    springs = by_value([f"{value:g}" for value in model.jnt_stiffness], names, "0")
+    stiffness = np.concatenate([model.jnt_stiffness[:, None], model.jnt_stiffnesspoly], axis=1)
+    rests = [float(model.qpos_spring[int(model.jnt_qposadr[j])]) for j in range(model.njnt)]
+    rows = [_spring(each, rest) for each, rest in zip(stiffness, rests, strict=True)]
+    springs = by_value(rows, names, "")
     if springs:
         yield f"left out: springs of joints, stiffness {springs} N m/rad; joints here have none"
+    yields = by_value([f"{value:g}" for value in model.jnt_springyield], names, "0")
+    if yields:
+        yield f"left out: that springs of joints yield, at {yields}; joints here have none"
     poly = [_numbers(model.dof_dampingpoly[int(model.jnt_dofadr[j])]) for j in range(model.njnt)]
     growing = by_value(poly, names, _numbers(np.zeros(model.dof_dampingpoly.shape[1])))
     if growing:
@@ -88,12 +101,21 @@ def _joints(model: Any) -> Iterator[str]:
         yield f"left out: gravcomp of {listing(held, MOST)}; gravity acts on all links"
 
 
+def _spring(stiffness: Any, rest: float) -> str:
+    """Return the stiffness of a spring, the coefficients of its growth with the deflection if it grows, and where it is at
+    rest if not at zero; empty where there is none."""
+    if not np.any(stiffness):
+        return ""
+    last = int(np.flatnonzero(stiffness)[-1])
+    return _numbers(stiffness[: last + 1]) + (f" about {rest:g}" if rest else "")
+
+
 def _servos(model: Any) -> Iterator[str]:
     """Yield the gains of servos, dynamics of actuators, and actuators that move no single joint."""
     import mujoco
 
     kinds, bias, dyn = mujoco.mjtTrn, mujoco.mjtBias, mujoco.mjtDyn
-    rows, joints, slow, others, curved = [], [], [], [], []
+    rows, joints, slow, others, curved, one_way = [], [], [], [], [], []
     for k in range(model.nactuator):
         kind = int(model.actuator_trntype[k])
         if kind == int(kinds.mjTRN_SITE):
@@ -105,13 +127,14 @@ def _servos(model: Any) -> Iterator[str]:
         name = model.joint(target).name
         if int(model.actuator_biastype[k]) == int(bias.mjBIAS_AFFINE):
             _, stiffness, damping = (0.0 - float(value) for value in model.actuator_biasprm[k][:3])
-            gear = float(model.actuator_gear[k][0]) ** 2
-            rows.append(f"kp {gear * stiffness:g}, kv {gear * damping:g}")
+            ratio = float(gear(model, k)[0]) ** 2
+            rows.append(f"kp {ratio * stiffness:g}, kv {ratio * damping:g}")
             joints.append(name)
         elif int(model.actuator_biastype[k]) != int(bias.mjBIAS_NONE):
             curved.append(name)
         if int(model.actuator_dyntype[k]) != int(dyn.mjDYN_NONE):
             slow.append(name)
+        one_way += [f"{text} ({name})" for text in _one_way(model, k)]
     gains = by_value(rows, joints, "")
     if gains:
         yield (
@@ -122,8 +145,84 @@ def _servos(model: Any) -> Iterator[str]:
         yield f"left out: how the torque of actuators on {listing(curved, MOST)} depends on their motion"
     if slow:
         yield f"left out: activation dynamics of the actuators on {listing(slow, MOST)}; motors here give their torque at once"
+    if one_way:
+        yield f"left out: that torques differ by direction, {listing(one_way, MOST)}; the larger counts for both here"
+    delays = by_value(
+        [f"{value:g} s" for value in model.actuator_delay], _actuator_names(model), "0 s"
+    )
+    if delays:
+        yield f"left out: delay of actuators, {delays}; robot.latency in a graph or trial delays commands"
+    kept = by_value(
+        [f"{int(row[0])}" for row in model.actuator_history], _actuator_names(model), "0"
+    )
+    if kept:
+        yield f"left out: nsample of actuators, {kept}; robot.latency in a graph or trial delays commands"
     if others:
         yield f"left out: actuators {listing(others, MOST)}, which drive no single joint; write them as transmission"
+
+
+def _actuator_names(model: Any) -> list[str]:
+    return [model.actuator(k).name or f"number {k + 1}" for k in range(model.nactuator)]
+
+
+def _one_way(model: Any, k: int) -> Iterator[str]:
+    """Yield the range of an actuator's force or control that is not the same in both directions."""
+    import mujoco
+
+    force, control = force_range(model, k), control_range(model, k)
+    limits: tuple[float, float] | None = None  # a servo's control is where it goes
+    if force is not None:
+        limits = force
+    elif int(model.actuator_biastype[k]) == int(mujoco.mjtBias.mjBIAS_NONE):
+        limits = control
+    if limits is not None and abs(limits[0] + limits[1]) > 1e-9 * max(map(abs, limits)):
+        yield f"{limits[0]:g} to {limits[1]:g}"
+
+
+def _sensors(model: Any) -> Iterator[str]:
+    """Yield what sensors do besides measuring, and what they have with the other sign."""
+    import mujoco
+
+    names = [model.sensor(k).name or f"number {k + 1}" for k in range(model.nsensor)]
+    for values, called, unit in (
+        (model.sensor_delay, "delay", " s"),
+        (model.sensor_interval[:, :1].ravel(), "interval", " s"),
+        (model.sensor_cutoff, "cutoff", ""),
+        (model.sensor_history[:, :1].ravel(), "nsample", ""),
+    ):
+        rows = [f"{float(value):g}{unit}" for value in values]
+        found = by_value(rows, names, f"0{unit}")
+        if found:
+            yield (
+                f"left out: {called} of sensors, {found}; noise of a sensor in the description has delay, range and "
+                "resolution"
+            )
+    kinds = (int(mujoco.mjtSensor.mjSENS_FORCE), int(mujoco.mjtSensor.mjSENS_TORQUE))
+    turned = [
+        name for name, kind in zip(names, model.sensor_type.tolist(), strict=True) if kind in kinds
+    ]
+    if turned:
+        yield (
+            f"sensors {listing(turned, MOST)} have the other sign here: MuJoCo gives what the carrying link does to the sensor's, "
+            "force_torque what the ground does to it"
+        )
+
+
+def _medium(model: Any) -> Iterator[str]:
+    """Yield what surrounds the robot: another gravity, and a medium that drags."""
+    import mujoco
+
+    gravity = f"gravity is {GRAVITY:g} m/s^2 downwards"
+    if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
+        yield f"left out: that gravity is off; {gravity}"
+    elif abs(float(np.linalg.norm(model.opt.gravity)) - GRAVITY) > 0.02:
+        yield f"left out: a gravity of {_numbers(model.opt.gravity)} m/s^2; {gravity}"
+    if model.opt.density or model.opt.viscosity:
+        wind = f", wind {_numbers(model.opt.wind)} m/s" if np.any(model.opt.wind) else ""
+        yield (
+            f"left out: a medium of density {model.opt.density:g} kg/m^3 and viscosity {model.opt.viscosity:g} Pa s{wind}; "
+            "nothing drags links here"
+        )
 
 
 def _tied(model: Any, spec: Any) -> Iterator[str]:

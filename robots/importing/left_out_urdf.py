@@ -31,6 +31,8 @@ SOFT = (
     "damping",
 )
 BOUNCE = ("restitution", "restitution_coefficient")
+RATES = ("acceleration", "deceleration", "jerk")
+"""Limits that later versions of the format know."""
 SPRINGS = ("springStiffness", "springReference")
 """Names of springs in Gazebo, SDF and Bullet."""
 TRUE = ("1", "true", "True")
@@ -105,6 +107,17 @@ def _joints(file: XmlFile) -> Iterator[str]:
             f"left out: soft limits {_names(soft)}; those of <limit> hold, and joints: {{NAME: {{limits: "
             "[LOW, HIGH]}} narrows them"
         )
+    rates = [
+        (
+            ", ".join(f"{key} {limit.get(key)}" for key in RATES if limit.get(key)),
+            joint.get("name", ""),
+        )
+        for joint in file.root.findall("joint")
+        if (limit := joint.find("limit")) is not None
+    ]
+    limited = by_value([text for text, _ in rates], [name for _, name in rates], "")
+    if limited:
+        yield f"left out: limits of joints' {limited}; motors here have torque and speed"
     coupled = [
         each.get("name") or f"number {k + 1}"
         for k, each in enumerate(file.root.findall("transmission"))

@@ -231,7 +231,7 @@ def yaml_text(
         f"# What {Path(file).name} does not say of the robot. Everything here was guessed or found by",
         "# `aloft robot import`: look at each part, correct it, and write where its numbers are from.",
         f"file: {file}",
-        f"name: {robot.name}",
+        f"name: {quoted(robot.name)}",
         'text: ""',
         f"base_joint: {robot.base_joint}",
         "",
@@ -260,8 +260,8 @@ def _feet(feet: list[dict[str, Any]]) -> list[str]:
         "feet:",
     ]
     for foot in feet:
-        lines.append(f"  - name: {foot['name']}")
-        lines.append(f"    at: {foot['at']}")
+        lines.append(f"  - name: {quoted(foot['name'])}")
+        lines.append(f"    at: {quoted(foot['at'])}")
         if "ball" in foot and any(foot["ball"]):
             lines.append(f"    ball: {vector(foot['ball'])}")
         if "points" in foot:
@@ -332,7 +332,7 @@ def _sensors(robot: RobotDescription, model: RawModel, built: LinkTree) -> list[
     feet = {foot.link for foot in robot.feet}
     for name, sensor in found.items():
         frame = built.frames[sensor.body]
-        entry = f"{name}: {{kind: {sensor.kind}, link: {frame.link}, position: {vector(frame.point(sensor.position))}"
+        entry = f"{name}: {{kind: {sensor.kind}, link: {quoted(frame.link)}, position: {vector(frame.point(sensor.position))}"
         turn = quaternions_of_matrices(frame.rotation @ sensor.rotation)
         if np.abs(turn[:3]).max() > SAME_DIRECTION:
             entry += f", orientation: {vector(tidy(turn, 9))}"
@@ -357,4 +357,15 @@ def _standing(angles: Mapping[str, float]) -> list[str]:
 
 
 def _numbers(angles: Mapping[str, float]) -> list[str]:
-    return [f"  {name}: {round(angle, 9):.9g}" for name, angle in angles.items()]
+    return [f"  {quoted(name)}: {round(angle, 9):.9g}" for name, angle in angles.items()]
+
+
+def quoted(name: str) -> str:
+    """Return a name as YAML has it: in quotes where YAML would take it for a number or a truth value."""
+    import yaml
+
+    try:
+        plain = yaml.safe_load(name) == name
+    except yaml.YAMLError:
+        plain = False
+    return name if plain else f'"{name}"'

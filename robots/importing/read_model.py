@@ -38,6 +38,7 @@ from .package_files import find_file
 from .raw_model import RawBody, RawJoint, RawModel
 from .ties import held_positions, tie_notes, ties_of_mjcf, ties_of_urdf
 from .urdf_text import UrdfJoint, XmlFile, check_urdf, urdf_joints
+from .urdf_words import limited_by_degrees
 from .xacro_text import XACRO
 
 
@@ -65,6 +66,7 @@ def read_model(path: Path) -> RawModel:
     with mujoco_remarks(remarks):
         spec, untouched = _parsed(file), _parsed(file)
     _refuse_closed_loops(spec, file)
+    _refuse_inner_free_joints(spec, file)
     written = written_inertials(spec, file.is_urdf)
     replace_inertials(spec, written)
     meshes = _take_meshes(spec, path.parent, written)
@@ -103,6 +105,8 @@ def read_model(path: Path) -> RawModel:
                 notes.append(
                     f"joint {name} has a negative {what} limit in the URDF, {value:g}: it counts as none"
                 )
+    if file.is_urdf:
+        notes += filter(None, map(limited_by_degrees, file.root.findall("joint")))
     notes += left_out_of_urdf(file) if file.is_urdf else left_out(model, spec)
     notes += unknown_sensors(model, file)
     if not file.is_urdf:  # what it passes over in a URDF is read above
@@ -191,6 +195,31 @@ def _refuse_closed_loops(spec: Any, file: XmlFile) -> None:
             listing(loops),
             "describe the mechanism by its transmission: transmission: {motors, joint_to_motor}",
         )
+
+
+def _refuse_inner_free_joints(spec: Any, file: XmlFile) -> None:
+    """Raise ``RobotError`` where a body moves freely on another one."""
+    import mujoco
+
+    inner = [
+        (joint.name, body.name, body.parent.name)
+        for body in spec.bodies[1:]
+        for joint in body.joints
+        if joint.type == mujoco.mjtJoint.mjJNT_FREE and body.parent.name != "world"
+    ]
+    if not inner:
+        return
+    what = [f"{name} of {body} on {parent}" for name, body, parent in inner]
+    fix = (
+        f'<link name="world"/> as the parent of {inner[0][0]} in place of {inner[0][2]}, or no {inner[0][2]} at all: a URDF\'s '
+        "robot floats by itself"
+        if file.is_urdf
+        else f"{inner[0][1]} in <worldbody> itself"
+    )
+    raise file.error(
+        f"a floating joint holds a body to another body: {listing(what)}",
+        "floating joints on the world only", listing(what), fix,
+    )  # fmt: skip
 
 
 def _name_everything(spec: Any, is_urdf: bool) -> None:

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from ...files.problems import listing
 from ..validation import DescriptionError, RobotError
 from ..validation.errors import number
-from .urdf_words import misspelt, wrong_inertia
+from .urdf_words import misspelt, turned_by_degrees, wrong_inertia
 from .xacro_text import XACRO, expand_xacro
 
 HINGES = ("revolute", "continuous")
@@ -141,9 +141,11 @@ def check_urdf(file: XmlFile) -> None:
     """Raise ``RobotError`` with everything that no reader of a URDF could make sense of."""
     errors: list[DescriptionError] = []
 
-    def add(tag: str, name: str, message: str, expected: str = "", found: str = "") -> None:
+    def add(
+        tag: str, name: str, message: str, expected: str = "", found: str = "", fix: str = ""
+    ) -> None:
         line, column = file.place(tag, name)
-        errors.append(DescriptionError((), message, expected, found, line=line, column=column))
+        errors.append(DescriptionError((), message, expected, found, fix, line, column))
 
     links = [link.get("name", "") for link in file.root.findall("link")]
     if not links:
@@ -156,6 +158,9 @@ def check_urdf(file: XmlFile) -> None:
         for found, meant in misspelt(part):
             what = f"{part.tag} {name} has {found}, which a URDF does not know"
             add(part.tag, name, what, meant, found)
+        for found, radians in turned_by_degrees(part):
+            what = f"{part.tag} {name} has angles that look like degrees, and a URDF's are radians"
+            add(part.tag, name, what, "radians", found, radians)
         wrong = wrong_inertia(part)
         if wrong:
             add("link", name, f"link {name} has a mass or an inertia that no body has",

@@ -72,6 +72,44 @@ def _near(word: str, known: tuple[str, ...]) -> str:
     return next(iter(swapped or nearest(word, known, 1, NEAR)), "")
 
 
+TURN = 2.0 * math.pi
+"""rad"""
+ROUND = 5.0
+"""Degrees of which angles that people write are multiples."""
+
+
+def turned_by_degrees(part: ElementTree.Element) -> Iterator[tuple[str, str]]:
+    """Yield the ``rpy`` of a link or joint that seem to be degrees, and what they are in radians: whole multiples of five
+    degrees beyond a turn.
+    """
+    for origin in part.iter("origin"):
+        angles = [_number(text) for text in (origin.get("rpy") or "").split()]
+        if any(abs(a) > TURN and a % ROUND == 0.0 for a in angles):
+            radians = " ".join(f"{math.radians(a):.9g}" for a in angles)
+            yield f'rpy="{origin.get("rpy")}"', f'rpy="{radians}"'
+
+
+def limited_by_degrees(joint: ElementTree.Element) -> str:
+    """Return a sentence on limits of a hinge that seem to be degrees, beyond two turns; empty where they do not. Some hinges
+    do turn so far, so it is no fault."""
+    limit = joint.find("limit")
+    if limit is None or joint.get("type") != "revolute":
+        return ""
+    ends = {key: _number(limit.get(key)) for key in ("lower", "upper") if limit.get(key)}
+    if not any(abs(a) > 2.0 * TURN and a % ROUND == 0.0 for a in ends.values()):
+        return ""
+    given = " ".join(f'{key}="{limit.get(key)}"' for key in ends)
+    radians = " ".join(f'{key}="{math.radians(a):.9g}"' for key, a in ends.items())
+    return f"limits of joint {joint.get('name', '')} look like degrees, {given}, and a URDF's are radians; write {radians} if they are"
+
+
+def _number(text: str | None) -> float:
+    try:
+        return float(text or "")
+    except ValueError:
+        return math.nan
+
+
 def wrong_inertia(link: ElementTree.Element) -> str:
     """Return the mass of a link and the numbers of its inertia that no body has, as they are written; empty where there
     are none.

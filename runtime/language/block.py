@@ -103,5 +103,9 @@ class Block(BlockHooks):
         """Build models and scratch arrays, once, after the ports are bound."""
 
     def metrics(self) -> Mapping[str, Metric]:
-        """Return the block's results at the end of a run, with units in their names."""
+        """Return the block's results at the end of a run, with units in their names.
+
+        ``success`` (a truth value) and ``reason`` judge the run; ``veto`` is a reason why it is no success,
+        for blocks that are no judges.
+        """
         return {}

@@ -6,6 +6,8 @@ from enum import IntEnum
 from importlib.util import find_spec
 from typing import Any
 
+from ...files.pip_line import pip_line
+
 
 class ExitCode(IntEnum):
     """Exit code of the process."""
@@ -64,29 +66,13 @@ def need_extra(module: str, extra: str, what: str) -> None:
         raise MissingExtraError(f"{what} needs the library {module}: {pip_line(extra)}")
 
 
-def pip_line(extra: str) -> str:
-    """Return the command that installs what an extra of aloft's brings.
-
-    It names the libraries themselves, so that it is right wherever aloft was installed from.
-    """
-    import re
-    from importlib import metadata
-
-    try:
-        declared = metadata.requires("aloft-robotics") or []
-    except metadata.PackageNotFoundError:  # a folder on the path that was never installed
-        declared = []
-    mark = re.compile(rf"""extra\s*==\s*['"]{re.escape(extra)}['"]""")
-    wanted = [each.partition(";")[0].strip() for each in declared if mark.search(each)]
-    names = " ".join(f"'{each}'" for each in wanted)
-    return f"pip install {names}" if names else f"pip install -e '.[{extra}]' where aloft lies"
-
-
 class RunError(AloftError):
     """A run ended early; the error names the block, the tick and the reason."""
 
     def __init__(self, message: str, *, block: str = "", tick: int = -1) -> None:
         super().__init__(message)
+        self.exit_code = ExitCode.RUN_FAILED
+        """``BAD_INPUT`` where a block cannot be right before anything has moved."""
         self.block = block
         self.tick = tick
         self.record_tick = False

@@ -21,13 +21,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ... import __version__
 from .errors import AloftError
 
 DECLARATION = "extension.toml"
 ENTRY_POINTS = "aloft.extensions"
 """The group in which other packages announce extensions."""
-KEYS = {"summary": str, "page": str, "extras": list, "needs": list, "verbs": dict, "provides": dict}
+KEYS = {
+    "summary": str, "page": str, "extras": list, "needs": list, "verbs": dict, "help": dict, "provides": dict,
+}  # fmt: skip
 """The keys of a declaration and the types of their values."""
 
 SHIPPED: Mapping[str, tuple[str, ...]] = {
@@ -54,11 +55,7 @@ SERVICES: Mapping[str, str] = {
 }
 """Services that the core requests from extensions, each with the extension of aloft that has it."""
 
-FROM_SOURCE = f"""install aloft from its source instead:
-    pip download --no-deps --no-binary :all: aloft-robotics=={__version__}
-    tar xzf aloft_robotics-{__version__}.tar.gz
-    pip install --editable aloft_robotics-{__version__}
-or, in a clone of the repository: pip install --editable ."""
+FROM_SOURCE = "install aloft from a clone of its repository instead: pip install --editable ."
 
 _PACKAGE = __name__.rpartition(".runtime.")[0]
 _ROOT = Path(__file__).parents[2]
@@ -85,6 +82,8 @@ class Extension:
     """Other extensions that it imports."""
     verbs: Mapping[str, str] = field(default_factory=dict)
     """The verbs of the command line, each with ``module:name``; ``robot reach`` is one of the group ``robot``."""
+    help: Mapping[str, str] = field(default_factory=dict)
+    """The panel and the summary of verbs: ``Recordings: Say why a run failed.``"""
     provides: Mapping[str, str] = field(default_factory=dict)
     """The services, each with ``module:name``."""
 
@@ -114,7 +113,7 @@ def read_declaration(name: str, folder: Path, package: str) -> Extension:
     return Extension(
         name, folder, package, found.get("summary", ""), found.get("page", ""),
         tuple(found.get("extras", ())), tuple(found.get("needs", ())), found.get("verbs", {}),
-        found.get("provides", {}),
+        found.get("help", {}), found.get("provides", {}),
     )  # fmt: skip
 
 
@@ -168,7 +167,7 @@ def missing_extension(name: str, what: str) -> str:
         return f"{what} is part of the lab, which is not in the wheel; {FROM_SOURCE}"
     return (
         f"{what} is part of the extension {name!r}, which is not here: its folder extensions/{name} is missing; "
-        "install aloft-robotics again to have it back"
+        "install aloft again to have it back"
     )
 
 

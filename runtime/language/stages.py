@@ -125,6 +125,8 @@ class ClockSpec:
     """The number of late ticks in a row that end the run, if the overrun policy is ``stop``."""
     late_after: float = 0.1
     """The share of a period after its deadline at which a tick that begins is late."""
+    late_share: float | None = None
+    """The largest share of late ticks with which a run is a success; ``None``: any."""
     hangs_after: float = 10.0
     """The time [s] after which a call of a block is taken to hang, which ends the run."""
 
@@ -169,7 +171,8 @@ class CheckedGraph:
 
     def block(self, path: str) -> BlockSpec:
         """Return the block at that path. Raises ``KeyError``."""
-        for spec in self.blocks:
-            if spec.path == path:
-                return spec
-        raise KeyError(path)
+        return self._by_path[path]
+
+    @cached_property
+    def _by_path(self) -> Mapping[str, BlockSpec]:
+        return {spec.path: spec for spec in self.blocks}

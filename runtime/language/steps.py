@@ -25,6 +25,7 @@ fields that it, or a kernel it calls, reads by name.
 from __future__ import annotations
 
 import inspect
+import linecache
 from collections.abc import Callable, Collection, Mapping
 from functools import cache, partial
 from types import CodeType, FunctionType
@@ -43,6 +44,7 @@ from ...mathematics.compiling.kernel_registry import (
     written_code,
 )
 from ...mathematics.compiling.kinds import NUMBER, ArrayKind, Kind, RecordKind, kind_of_annotation
+from ...mathematics.kernel import kernel
 from .errors import BlockError, DeclarationError
 from .parameters import Parameters, parameter_kinds
 from .signals import Signal
@@ -66,6 +68,8 @@ def declare_steps(cls: type[Any]) -> None:
     for name in METHODS:
         value = vars(cls).get(name)
         function = value.__func__ if isinstance(value, staticmethod) else value
+        if type(function).__module__.startswith("numba."):
+            function = kernel_of_numba(cls, name, function)
         if not isinstance(function, FunctionType) or hasattr(function, "binds"):
             continue
         names = arguments_of(function)
@@ -75,10 +79,26 @@ def declare_steps(cls: type[Any]) -> None:
             declare(cls, function)
             own[name] = function
             overridden.discard(name)
-            made = step_in_file_of(cls, name, written_code(function))
+            place = value.py_func.__code__ if hasattr(value, "py_func") else written_code(function)
+            made = step_in_file_of(cls, name, place)
             made.__doc__, made.binds = function.__doc__, function
             setattr(cls, name, made)
     cls.named_steps, cls.overridden_steps = own, frozenset(overridden)
+
+
+def kernel_of_numba(cls: type[Any], name: str, function: Any) -> FunctionType:
+    """Make a kernel that calls a function of ``@numba.njit``, which is a step of a class itself."""
+    plain = function.py_func
+    names = ", ".join(plain.__code__.co_varnames[: plain.__code__.co_argcount])
+    text = f"def {name}({names}):\n    function({names})\n"
+    file = f"<{cls.__module__}.{cls.__qualname__}.{name}>"
+    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)
+    scope = {**plain.__globals__, "function": function}
+    exec(compile(text, file, "exec"), scope)  # noqa: S102  # of the text above
+    made: FunctionType = scope[name]
+    made.__module__, made.__qualname__ = cls.__module__, f"{cls.__qualname__}.{name}"
+    made.__doc__, made.__annotations__ = plain.__doc__, dict(plain.__annotations__)
+    return kernel(made)
 
 
 def declare(cls: type[Any], function: FunctionType) -> None:
@@ -250,7 +270,15 @@ def signal_call(function: Callable[..., None], *arguments: Any) -> KernelCall:
 @cache
 def names_used(function: FunctionType) -> frozenset[str]:
     """All attributes that a kernel and those that it calls name."""
-    return frozenset(n for each in closure(function) for n in written_code(each).co_names)
+    names = {n for each in closure(function) for n in written_code(each).co_names}
+    for value in (
+        each.__globals__.get(n) for each in closure(function) for n in written_code(each).co_names
+    ):
+        if type(value).__module__.startswith("numba."):
+            from ...mathematics.compiling.numba_calls import is_numba, names_read
+
+            names |= names_read(value) if is_numba(value) else set()
+    return frozenset(names)
 
 
 def _python_argument(block: Block, name: str) -> Any:

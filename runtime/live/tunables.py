@@ -70,6 +70,10 @@ class Tunables:
     ) -> dict[str, Any]:
         kind, choices = _kind(value, info)
         least, most, words = _bounds(info)
+        # A block may know the range of its own parameters better than their declaration.
+        own_range = getattr(self._blocks[block].params, "live_range", None)
+        if own_range is not None and kind in ("number", "numbers"):
+            least, most = own_range(path.removeprefix(f"{block}.").partition(".")[0])
         low, high = _range(start if kind in ("number", "numbers") else None, least, most)
         text = info.description if info is not None and info.description else entry["text"]
         return {
@@ -78,7 +82,9 @@ class Tunables:
             "name": path.removeprefix(f"{block}."),
             "value": value,
             "start": start,
-            "unit": (unit_of(info) if info is not None else "") or entry["unit"],
+            "unit": (unit_of(info) if info is not None else "")
+            or entry["unit"]
+            or self._own_unit(block, path),
             "text": text,
             "kind": kind,
             "choices": choices,
@@ -88,6 +94,12 @@ class Tunables:
             "bounds": words,
             "place": self._place(path),
         }
+
+    def _own_unit(self, block: str, path: str) -> str:
+        """Return the unit that a block's parameters share, where this is one of them."""
+        params: Any = self._blocks[block].params
+        name = path.removeprefix(f"{block}.").partition(".")[0]
+        return str(params.unit) if name in getattr(params, "in_unit", ()) else ""
 
     def _place(self, path: str) -> str:
         """Return the place where a parameter is written; of one that is not, its block's place."""
@@ -228,7 +240,7 @@ def write_overlay(path: Path, graph: CheckedGraph, rows: Sequence[Mapping[str, A
         text = _text(included, found)
         checked_text(text, path)
         if path.exists() and not path.read_text(encoding="utf-8").startswith(FIRST_LINE):
-            raise AloftError(f"{path} is there already; give another name with --save FILE")
+            raise AloftError(f"{path} is there already; give another name with --out FILE")
         path.write_text(text, encoding="utf-8")
     except LoadError as error:
         raise AloftError(f"the file would not load: {error}") from error

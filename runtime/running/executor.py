@@ -96,6 +96,7 @@ class Executor:
         self._fuse = fuse and not plain
         self._warnings: list[str] = []
         self._paused = 0  # [ns]
+        self._error: RunError | None = None
 
     def start(self, ticks: int | None = None) -> None:
         """Compile the kernels, open the sinks and start all blocks: idle -> ready.
@@ -161,6 +162,7 @@ class Executor:
                 error.__cause__ = failure
             finally:
                 end_time = self._time.now()
+                self._error = error
                 if error is not None:
                     self._note_error(locate(error))
                 self._note("life", f"stopping: {clock.stop_reason or 'the end'}")
@@ -205,7 +207,11 @@ class Executor:
         clock = self.bound.clock
         who = f"block '{block}'" if block else "the runtime"
         text = hang_text(who, self.ticker.instant(clock.tick), self._spec.hangs_after)
-        error = RunError(f"{text}; nothing interrupts it", block=block, tick=clock.tick)
+        error = RunError(
+            f"{self._before_hang(interrupts)}{text}; nothing interrupts it",
+            block=block,
+            tick=clock.tick,
+        )
         error.where, error.traceback = place, stack
         clock.stop_reason = clock.stop_reason or str(error)
         self._note_error(error)
@@ -219,6 +225,15 @@ class Executor:
             sink.abandoned(result)
         if not interactive:
             os._exit(int(ExitCode.RUN_FAILED))
+
+    def _before_hang(self, interrupts: Interrupts) -> str:
+        """Return what had ended the run before a call hung while it stopped; empty if nothing had."""
+        if self._error is not None:
+            return f"{self._error}; then "
+        if self.life.state is not LifeState.STOPPING:
+            return ""
+        result = self._result(self.bound.clock.tick, 0.0, None, [], interrupts)
+        return "" if result.success else f"{result.reason}; then "
 
     def _compile_kernels(self) -> None:
         """Compile the kernels that the blocks call, before any block is started."""
@@ -310,7 +325,11 @@ class Executor:
             except Exception as failure:  # noqa: BLE001  # the other blocks' metrics still count
                 problems.append(f"block '{path}' failed in metrics: {describe(failure)}")
         metrics, unmet, success_reason = merge_metrics(by_block)
+        unmet = unmet or self._too_late(ticks)
         judges = [path for path, of_block in by_block.items() if of_block.get("reason")]
+        ended = by_block.get(self.bound.clock.stopped_by, {})
+        if not ended.get("success", True) and ended.get("reason"):
+            unmet = str(ended["reason"])  # the cause, before what follows from it
         unmet, success_reason = (
             self._with_stop(unmet, judges),
             self._with_stop(success_reason, judges),
@@ -340,6 +359,16 @@ class Executor:
             graph=self.bound.graph,
         )
 
+    def _too_late(self, ticks: int) -> str | None:
+        """Return why a run with so many late ticks is no success, where its graph has a limit."""
+        pacer, share = self.ticker.pacer, self.ticker.policy.late_share
+        if pacer is None or share is None or pacer.lateness.late <= share * ticks:
+            return None
+        return (
+            f"{pacer.lateness.late} of {ticks} ticks began late, at most {100.0 * share:g} % may "
+            "(clock.late_share)"
+        )
+
     def _times_of(self, path: str) -> BlockTimes:
         block = self.bound.blocks[path]
         if isinstance(block, WorkerBlock):
@@ -362,7 +391,7 @@ class Executor:
         unmet: str | None,
         success_reason: str | None,
     ) -> tuple[ExitCode, str]:
-        """Return the exit code and the reason; of several reasons, the gravest."""
+        """Return the exit code and the reason: the gravest code, and first what came first."""
         stopped = self.bound.clock.stop_reason
         if error is not None and not isinstance(error.__cause__, KeyboardInterrupt):
             return ExitCode.RUN_FAILED, str(error)
@@ -372,7 +401,8 @@ class Executor:
         if error is not None:
             return ExitCode.INTERRUPTED, str(error)
         if problems:
-            return ExitCode.RUN_FAILED, problems[0]
+            # what went wrong while stopping came after what ended the run
+            return ExitCode.RUN_FAILED, "; ".join([*([unmet] if unmet else []), problems[0]])
         if unmet is not None:
             return ExitCode.NOT_SUCCESSFUL, unmet
         return ExitCode.SUCCESS, success_reason or stopped or "ran to its end"

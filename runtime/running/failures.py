@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..language.errors import AloftError, RunError
+from ..language.errors import AloftError, ExitCode, RunError
 from ..language.stages import BlockSpec
 
 
@@ -84,4 +84,8 @@ def blame(spec: BlockSpec, what: str) -> Iterator[None]:
             f"{place}block '{spec.path}' failed in {what}: {reason}", block=spec.path
         )
         failure.__cause__ = error
+        if not isinstance(
+            error, AloftError | OSError
+        ):  # a mistake in the block, not of its surroundings
+            failure.exit_code = ExitCode.BAD_INPUT
         raise locate(failure) from error

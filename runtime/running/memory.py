@@ -25,6 +25,7 @@ from ..language.signals import DTYPES, Signal
 from ..language.stages import BlockSpec, CheckedGraph
 from ..language.steps import bind_steps
 from .failures import blame
+from .kernel_checks import check_kernels
 from .live_parameters import LiveParameters
 
 
@@ -216,6 +217,7 @@ class BoundGraph:
         self.kernel_calls: Sequence[KernelCall] = tuple(calls)
         """The calls of kernels that the blocks made in ``setup``."""
         self.parameters = LiveParameters(self.blocks)
+        check_kernels(graph, self.blocks)
 
     def _set_up(self, spec: BlockSpec) -> Block:
         context = Context(

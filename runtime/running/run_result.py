@@ -188,12 +188,13 @@ def merge_metrics(
 ) -> tuple[dict[str, Metric], str | None, str | None]:
     """Merge the metrics of all blocks, and find the verdicts of the blocks that judge the run.
 
-    A block judges the run if it has a metric ``success``.
+    A block judges the run if it has a metric ``success``. A metric ``veto`` is the reason why a run is no
+    success whatever is judged, as that it was damped; where a judge has a reason of its own, that one counts.
 
     Returns:
         The merged metrics, in which those of judging blocks come first; the ``reason`` of the first
-        block whose ``success`` is false, or ``None``; and the ``reason`` of the first block whose
-        ``success`` is true, or ``None``.
+        block whose ``success`` is false, or the first ``veto``, or ``None``; and the ``reason`` of the
+        first block whose ``success`` is true, or ``None``.
     """
     by_block = dict(sorted(by_block.items(), key=lambda item: "success" not in item[1]))
     owners: dict[str, list[str]] = {}
@@ -209,6 +210,8 @@ def merge_metrics(
     merged: dict[str, Metric] = {}
     for path, metrics in by_block.items():
         for name, value in metrics.items():
-            if name not in ("success", "reason"):
+            if name not in ("success", "reason", "veto"):
                 merged[name if len(owners[name]) == 1 else f"{path}.{name}"] = value
+    if failure is None:
+        failure = next((str(m["veto"]) for m in by_block.values() if m.get("veto")), None)
     return merged, failure, success_reason

@@ -228,6 +228,10 @@ class Ticker:
             if isinstance(error, Hang):
                 text = hang_text(who, self.instant(tick), self.policy.hangs_after)
                 return RunError(text, block=block, tick=tick)
+            if isinstance(owner, Block) and str(error).startswith("compiled kernel "):
+                from ...mathematics.compiling.rehearsal import explained
+
+                error = explained(error, self.bound.kernel_calls) or error
             text = f"{who} failed at {self.instant(tick)}: {describe(error)}"
             if isinstance(error, ValueError) and "read-only" in str(error):
                 text += "; an input cannot be written: copy it into an array made in setup()"

@@ -1,6 +1,6 @@
 """A stretch of a recorded run as a test of one block: its first state, inputs and expected outputs.
 
-``aloft test --from RECORDING --block NAME --ticks A:B`` writes such a test and the data beside it.
+``aloft test --recording FILE --block NAME --ticks A:B`` writes such a test and the data beside it.
 """
 
 from __future__ import annotations

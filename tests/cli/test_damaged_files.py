@@ -49,7 +49,7 @@ def damaged(data: bytes, draw: random.Random) -> bytes:
         ["log", "export", "{}", "--mcap", "-o", "out.mcap"],
         ["log", "export", "{}", "--csv", "-o", "out.csv"],
         ["log", "compare", "whole.rrd", "{}"],
-        ["view", "{}", "--with", "whole.rrd", "--save", "both.rrd", "--no-show"],
+        ["view", "{}", "--with", "whole.rrd", "--out", "both.rrd", "--no-show"],
         ["log", "repair", "{}"],
     ],
     ids="-".join,

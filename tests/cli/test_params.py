@@ -142,7 +142,7 @@ def test_what_does_not_begin_paused(
 
 
 PAGES = [
-    (("params", "web", "--save", "fast.yaml"), '"opened": "parameters"'),
+    (("params", "web", "--out", "fast.yaml"), '"opened": "parameters"'),
     (("graph", "--live"), '"opened": "diagram"'),
     (("graph", "tune.yaml", "--live"), "tune-tuned.yaml"),
 ]

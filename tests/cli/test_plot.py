@@ -41,6 +41,18 @@ def test_elements_ports_and_times(recording: Path, call: Call) -> None:
     text = call("plot", str(recording), "wave.y[1]", "--from", "0.2", "--to", "0.5").stdout
     assert text.splitlines()[-1].split() == ["0.2", "time", "[s]", "0.5"]
     assert "error" not in text
+    assert text.splitlines()[0] == "wave.y.value [m]: 1"  # which element it is
+
+
+def test_recordings_are_drawn_over_each_other(recording: Path, call: Call, tmp_path: Path) -> None:
+    from aloft import load, write_recording
+
+    other = tmp_path / "larger.rrd"
+    write_recording(other, load(GRAPH, {"wave.amplitude": 3.0, "duration": 0.5}).run())
+    lines = call("plot", str(recording), str(other), "wave.y[0]").stdout.splitlines()
+    assert lines[0] == "wave.y.value [m]: wave 0, larger 0"
+    assert lines[1].split()[0] == "3" and lines[-1].split()[-1] == "0.99"
+    assert "which signals?" in call("plot", str(recording), str(other), code=2).stderr
 
 
 def test_files(recording: Path, call: Call, tmp_path: Path) -> None:

@@ -58,7 +58,7 @@ def test_a_film_has_a_picture_for_each_step_of_time(
 
 
 @pytest.mark.parametrize(
-    "words", [["render"], ["plot", "a.b"], ["view", "--save", "x.rrd", "--no-show"]]
+    "words", [["render"], ["plot", "a.b"], ["view", "--out", "x.rrd", "--no-show"]]
 )
 def test_a_recording_that_is_not_there_is_one_line(words: list[str], tmp_path: Path) -> None:
     file = tmp_path / "n.rrd"

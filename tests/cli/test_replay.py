@@ -69,9 +69,9 @@ def test_the_same_bytes(recording: Path, call: Call, call_json: CallJson) -> Non
         assert answer["success"] and answer["ticks"] == 300
         assert answer["first_difference"] is None and answer["fields"] == {}
     assert answer["keyframes"] == 3
-    answer = call_json("replay", str(recording), "--check", "--from", "250")
+    answer = call_json("replay", str(recording), "--check", "--from-tick", "250")
     assert answer["first_tick"] == 200 and answer["ticks"] == 100
-    answer = call_json("replay", str(recording), "--until", "50")
+    answer = call_json("replay", str(recording), "--until-tick", "50")
     assert answer["ticks"] == 50 and answer["success"]
 
 
@@ -109,7 +109,7 @@ def test_a_swapped_block_beside_the_recorded_one(
     assert first["ulps"] == 1 and answer["differing_elements"] == 1 and answer["ran"] == ["gain"]
     assert Path(answer["output"]) == recording.with_name("wave-replay.rrd")
     assert recording.with_name("wave-replay.rrd").stat().st_size > 0
-    done = call("replay", str(recording), "--set", "gain.gain=1.75", "--output", "both.rrd")
+    done = call("replay", str(recording), "--set", "gain.gain=1.75", "--out", "both.rrd")
     assert "recorded and replayed side by side: both.rrd" in done.stdout
     row = next(line.split() for line in done.stdout.splitlines() if "gain.y.value" in line)
     assert row[1] == "0.25"  # the wave's peak is one
@@ -133,9 +133,10 @@ def test_what_is_refused(recording: Path, folder: Path, call_json: CallJson) -> 
     )
     assert "has no class 'Gian'" in reason(name, "--swap", "gain=gains:Gian")
     assert "1 problem" in reason(name, "--set", "gain.gain=high")
-    assert "tick 300 is not in the recording" in reason(name, "--from", "300")
-    assert "--from 70 --until 60 is no stretch of the run: the end must lie behind" in reason(
-        name, "--from", "70", "--until", "60"
+    assert "tick 300 is not in the recording" in reason(name, "--from-tick", "300")
+    assert (
+        "--from-tick 70 --until-tick 60 is no stretch of the run: the end must lie behind"
+        in reason(name, "--from-tick", "70", "--until-tick", "60")
     )
     (folder / "other.rrd").write_bytes(b"RRF2 nothing")
     assert "other.rrd was cut off before its beginning was written" in reason("other.rrd")

@@ -60,10 +60,12 @@ def test_a_recording_becomes_a_test_that_pytest_runs(
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")  # starts twice as fast
     call("run", "count.yaml", "--quiet")
     record = "recordings/count.rrd"
-    answer = call_json("test", "--from", record, "--block", "counter", "--ticks", "20:30")
+    answer = call_json("test", "--recording", record, "--block", "counter", "--ticks", "20:30")
     assert answer["test"] == "test_counter_20_30.py" and answer["runs"] == 10
     (folder / "tests").mkdir()
-    done = call("test", "--from", record, "--block", "double", "--ticks", "5", "--rtol", "1e-9")
+    done = call(
+        "test", "--recording", record, "--block", "double", "--ticks", "5", "--rtol", "1e-9"
+    )
     assert "tests/test_double_5_6.py: 1 runs of double" in done.stdout
     assert "rtol=1e-09" in (folder / "tests" / "test_double_5_6.py").read_text()
     answer = call_json("test", "tests")
@@ -78,14 +80,14 @@ def test_what_is_refused(folder: Path, call_json: CallJson) -> None:
     def reason(*arguments: str) -> str:
         return str(call_json("test", *arguments, code=2)["reason"])
 
-    assert reason("--from", "none.rrd", "--block", "a", "--ticks", "1:2") == (
+    assert reason("--recording", "none.rrd", "--block", "a", "--ticks", "1:2") == (
         "there is no recording none.rrd"
     )
-    assert reason("--block", "counter").startswith("--block, --ticks and --output go with --from")
+    assert reason("--block", "counter").startswith("--block, --ticks and --out go with --recording")
     assert "blocks.Contacts" in reason("blocks.Contacts")
     call_json("run", "count.yaml")
-    record = ("--from", "recordings/count.rrd")
-    assert reason(*record) == "--from needs --block NAME and --ticks FIRST:END"
+    record = ("--recording", "recordings/count.rrd")
+    assert reason(*record) == "--recording needs --block NAME and --ticks FIRST:END"
     assert reason(*record, "--block", "counter", "--ticks", "a:b") == (
         "ticks 'a:b' are no range like 1200:1400"
     )

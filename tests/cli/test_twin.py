@@ -19,7 +19,7 @@ def test_it_ends_at_a_signal_while_nobody_reads_its_packets(
     tmp_path: Path, number: signal.Signals
 ) -> None:
     file = tmp_path / "twin.yaml"
-    command = [sys.executable, "-m", "aloft", "twin", "--write", str(file), "--json"]
+    command = [sys.executable, "-m", "aloft", "twin", "--out", str(file), "--json"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tmp_path)
     try:
         assert process.stdout is not None

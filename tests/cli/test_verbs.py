@@ -1,6 +1,7 @@
 """``aloft check``, ``graph``, ``blocks`` and ``bench``, help and completion."""
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -8,10 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 
 import aloft
 import aloft.lab.benchmarks.catalogue
 import aloft.runtime.loading
+from aloft.cli.app import all_verbs, make_app
+from aloft.cli.verbs import PANELS, help_page
+from aloft.logs.file.code import code_of, remember
+from aloft.runtime.loading import flatten
 
 Call = Callable[..., subprocess.CompletedProcess[str]]
 CallJson = Callable[..., dict[str, Any]]
@@ -92,6 +98,12 @@ def test_shipped_graphs_have_addresses(
     for wrong in ("jump.yaml", "graphs/jump.yaml", "aloft:jmp"):
         (problem,) = call_json("run", wrong, code=2)["problems"]
         assert problem["fix"].startswith("aloft:jump, which is shipped")
+    (tmp_path / "bounce.yaml").write_text("rate: 1 Hz\n")
+    (problem,) = call_json("run", "bounse.yaml", code=2)["problems"]
+    assert problem["fix"] == "bounce.yaml"
+    (problem,) = call_json("run", "zzz.yaml", code=2)["problems"]
+    assert problem["message"] == "cannot read zzz.yaml: No such file or directory"
+    assert not problem["nearest"] and "jump" not in problem["fix"]
 
 
 def test_blocks_names_those_of_that_class(call: Call) -> None:
@@ -175,10 +187,13 @@ def complete(start: Start, words: str) -> list[str]:
 
 
 @pytest.mark.long
-def test_the_tab_key_completes(folder: Path, start: Start) -> None:
+def test_the_tab_key_completes(folder: Path, start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     assert complete(start, "aloft ru") == ["run"]
     assert "--seeds" in complete(start, "aloft run --se")
     assert complete(start, "aloft blocks blocks.Ga") == ["blocks.Gain"]
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+    assert complete(start, "aloft run count.yaml --set counter.s") == [], "its module never ran"
+    remember(code_of(flatten(folder / "count.yaml")))
     assert complete(start, "aloft run count.yaml --set counter.s") == [
         "counter.seed=",
         "counter.stop_at=",
@@ -190,8 +205,46 @@ def test_help_documents_the_exit_codes(call: Call) -> None:
     for arguments in (("--help",), ("run", "--help")):
         text = call(*arguments).stdout
         for code in (0, 1, 2, 3, 130, 143):
-            assert f"\n    {code} " in text
+            assert re.search(rf"^ +{code} ", text, re.MULTILINE)
     assert call("--version").stdout.startswith("aloft ")
+
+
+def test_the_list_of_verbs_imports_no_verb_and_cuts_no_summary(start: Start) -> None:
+    before = "import atexit, sys\natexit.register(lambda: print(*sys.modules))\n"
+    for argument in ("--help", "--version"):
+        output, errors = start(argument, before=before).communicate(timeout=240)
+        *lines, last = output.splitlines()
+        tops = {name.partition(".")[0] for name in last.split()}
+        assert not tops & {*HEAVY, "typer", "click", "numpy", "pydantic", "yaml"}, errors
+        assert all(len(line) <= 80 and "..." not in line.replace("VERB ...", "") for line in lines)
+    text = help_page()
+    for verb in all_verbs():
+        assert re.search(rf"^  {verb} +[A-Z].*\.$", text, re.MULTILINE), verb
+    assert re.findall(r"^(\w+):$", text, re.MULTILINE)[: len(PANELS)] == list(PANELS)
+    assert "Other:" not in text
+
+
+def options_of(command: Any, path: str = "aloft") -> list[tuple[str, str]]:
+    """Every option of a command and of those in it: the command's path and its option."""
+    inner = getattr(command, "commands", {})
+    own = [(path, option) for each in command.params for option in each.opts]
+    return [*own, *(row for name in inner for row in options_of(inner[name], f"{path} {name}"))]
+
+
+def test_an_option_has_one_meaning() -> None:
+    rows = options_of(typer.main.get_command(make_app()))
+    times = {path for path, option in rows if option in ("--from", "--to")}
+    assert times == {"aloft plot", "aloft render"}
+    assert not {option for _, option in rows} & {"--save", "--write"}
+    signals = {path for path, option in rows if option == "--output"}
+    assert signals == {"aloft linearise", "aloft export c", "aloft export fmu"}
+
+
+@pytest.mark.parametrize("verb", ["run", "plot", "replay", "robot", "log"])
+def test_help_names_values_as_a_reader_does(call: Call, verb: str) -> None:
+    text = call(verb, "--help").stdout
+    assert "list[" not in text and " range>" not in text and "<path>" not in text
+    assert "..." not in text.replace("[ARGS]...", "").replace("SIGNAL...", "")
 
 
 def test_check_answers_at_once(start: Start) -> None:
@@ -215,8 +268,8 @@ atexit.register(lambda: print(len(searched), gc.get_freeze_count(), *sys.modules
     ours = [name for name in modules if name.startswith("aloft.")]
     assert len(ours) < 300
     assert {name for name in ours if name.startswith("aloft.cli.")} == {
-        "aloft.cli.app", "aloft.cli.check", "aloft.cli.shared", "aloft.cli.shared.options",
-        "aloft.cli.shared.output",
+        "aloft.cli.app", "aloft.cli.check", "aloft.cli.shared", "aloft.cli.shared.help_texts",
+        "aloft.cli.shared.options", "aloft.cli.shared.output", "aloft.cli.verbs",
     }  # fmt: skip
 
 

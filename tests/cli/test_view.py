@@ -27,7 +27,7 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
 
 def test_options_that_mean_nothing(tmp_path: Path) -> None:
     code, text = view(tmp_path / "a.rrd", "--with", "b.rrd", "--no-show")
-    assert code == 2 and "add --save FILE.rrd" in text
+    assert code == 2 and "add --out FILE.rrd" in text
 
 
 @pytest.mark.long
@@ -35,11 +35,11 @@ def test_what_is_shown_can_be_kept(tmp_path: Path) -> None:
     recording, kept = tmp_path / "count.rrd", tmp_path / "kept.rrd"
     graph = str(ROOT / "tests/cli/count.yaml")
     CliRunner().invoke(make_app(), ["run", graph, "--record", str(recording), "-q"])
-    code, _ = view(recording, "--save", kept, "--no-show")
+    code, _ = view(recording, "--out", kept, "--no-show")
     assert code == 0 and kept.stat().st_size > 1000
     assert b"\x89PNG" in kept.read_bytes(), "the diagram is in it"
     before = recording.read_bytes()
-    code, text = view(recording, "--save", recording, "--no-show")
+    code, text = view(recording, "--out", recording, "--no-show")
     assert code == 2 and "would overwrite the recording; name another file" in text
     code, text = view(kept, "--layout", tmp_path / "own.yaml")
     assert code == 2 and "has no signals for the layout" in text
@@ -60,14 +60,14 @@ def test_where_the_code_has_gone_there_is_no_diagram(
 
     monkeypatch.setattr(OpenedRun, "changed", gone)
     assert diagram_of(read(recording)) == b""
-    code, _ = view(recording, "--save", kept, "--no-show")
+    code, _ = view(recording, "--out", kept, "--no-show")
     assert code == 0 and b"\x89PNG" not in kept.read_bytes()
 
 
 def test_a_comparison_of_what_is_no_recording(tmp_path: Path) -> None:
     path = tmp_path / "a.rrd"
     path.write_text("nothing")
-    code, text = view(path, "--with", path, "--save", tmp_path / "both.rrd", "--no-show")
+    code, text = view(path, "--with", path, "--out", tmp_path / "both.rrd", "--no-show")
     assert code == 2 and "is not a recording: it does not begin like" in text
 
 
@@ -81,7 +81,7 @@ def test_two_runs_become_one_file(tmp_path: Path) -> None:
             make_app(), ["run", *arguments, "--duration", "0.05 s", "--set", f"robot.seed={seed}"]
         )
     both = tmp_path / "both.rrd"
-    code, _ = view(paths[0], "--with", paths[1], "--save", both, "--no-show")
+    code, _ = view(paths[0], "--with", paths[1], "--out", both, "--no-show")
     assert code == 0
     from rerun.chunk import RrdReader
 

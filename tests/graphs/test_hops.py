@@ -30,7 +30,7 @@ def test_the_speed_changes_while_it_hops_on() -> None:
     """In the standard trial; how often it succeeds is a benchmark's matter (aloft bench hopping_on)."""
     twists = [{"ahead": 0.3}, {"at": 2.0, "ahead": 0.0}, {"at": 3.0, "ahead": 0.4}]
     sets = {"robot.seed": 0, "plan.jumps": 8, "score.jumps": 8, "speed.twists": twists}
-    run = aloft.load(GRAPHS / "hop_on.yaml", sets).run()
+    run = aloft.load("aloft:hopping/hop_on", sets).run()
     assert run.success, run.reason
     assert run.metrics["jumps"] == 8
     assert run.metrics["mean_length_error_m"] < 0.01

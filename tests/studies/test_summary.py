@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+import pyarrow
 import pytest
 from pyarrow import parquet
 
@@ -78,6 +79,10 @@ def test_columns_have_one_type_and_nulls_where_nothing_is(tmp_path: Path, study:
         "run_hash": "string", "a_m": "double", "b": "int64", "flag": "bool",
         "metric.seed": "int64", "word": "string", "wall_time_s": "double",
     }  # fmt: skip
+    zeros = pyarrow.table({"zero": [0.0, 0.0]})
+    write_table(tmp_path / "zeros.parquet", zeros)
+    rule = [("zero", "in", [0.0])]
+    assert len(parquet.read_table(tmp_path / "zeros.parquet", filters=rule)) == 2
     assert table["x_mm"].to_pylist() == [10.0, 10.0, 20.0]
     assert table["a_m"].to_pylist() == [1.0, 2.5, None]
     assert table["tuning_seed"].to_pylist() == [True, True, False]

@@ -34,13 +34,13 @@ def branch(
         float | None, typer.Option(help="When it ends [s]; by default as the graph says.")
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Both runs side by side, a .rrd file.")
+        Path | None, typer.Option("--out", "-o", help="Both runs side by side, a .rrd file.")
     ] = None,
     folder: GraphFolder = None,
     trust: Trust = False,
     as_json: JsonBesideTables = False,
 ) -> None:
-    """Let a recorded run go on from its exact state with other parameters, beside the original."""
+    """Resume a recorded run from any time with different parameters, and compare."""
     from ..branching import branch as branch_run
 
     out = console(to_stderr=as_json)

@@ -44,7 +44,9 @@ def falsify(
     ] = False,
     output: Annotated[
         Path | None,
-        typer.Option(help="With --keep: the test; by default test_NAME_falsified.py in tests/."),
+        typer.Option(
+            "--test", help="With --keep: the test; by default test_NAME_falsified.py in tests/."
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for the runs; by default results/NAME.")
@@ -68,7 +70,7 @@ def falsify(
         if study.falsification is None:
             raise AloftError(f"{study.path} has no section 'falsify'")
         if output is not None and not keep:
-            raise AloftError("--output goes with --keep")
+            raise AloftError("--test goes with --keep")
         section = study.falsification
         section = replace(
             section, draws=draws or section.draws, seed=section.seed if seed is None else seed

@@ -33,11 +33,11 @@ def linearise(
     graph: Annotated[str, typer.Argument(help="The graph file.")],
     inputs: Annotated[
         list[str],
-        typer.Option("--from", help="A signal, such as pd.command.torque[*_knee]. Repeatable."),
+        typer.Option("--input", help="A signal, such as pd.command.torque[*_knee]. Repeatable."),
     ],
     outputs: Annotated[
         list[str] | None,
-        typer.Option("--to", help="A signal that is observed; by default those of --from."),
+        typer.Option("--output", help="A signal that is observed; by default those of --input."),
     ] = None,
     at: Annotated[float | None, typer.Option(help="The instant [s].")] = None,
     when: Annotated[
@@ -45,7 +45,9 @@ def linearise(
     ] = "",
     opened: Annotated[
         bool,
-        typer.Option("--open", help="Open the loop at --from. Without --to this gives margins."),
+        typer.Option(
+            "--open", help="Open the loop at --input. Without --output this gives margins."
+        ),
     ] = False,
     locus: Annotated[
         str,

@@ -396,7 +396,7 @@ def keep(text: str, reason: str, path: Path) -> tuple[Path, Path]:
     graph = path.with_name(f"{name}.yaml")
     for file in (path, graph):
         if file.exists():
-            raise AloftError(f"{file} is there already; give another name with --output")
+            raise AloftError(f"{file} is there already; give another name with --test")
     quoted = reason.replace("\\", "/").replace('"', "'")
     test = TEST.format(reason=quoted, name=name, file=graph.name)
     for file, content in ((graph, text), (path, test)):

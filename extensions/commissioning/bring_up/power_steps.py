@@ -290,7 +290,7 @@ def hold_in_the_air(session: Session) -> StepReport:
     except BusError as error_text:
         report.add(
             "drives", "drives that hold the standing pose in the air", str(error_text),
-            "the text names the drive: --from current",
+            "the text names the drive: --first current",
         )  # fmt: skip
         return report
     finally:
@@ -319,7 +319,7 @@ def _hang(session: Session, report: StepReport) -> bool:
     missing = session.hardware.missing_calibration()
     if missing:
         report.add(
-            "motors", "zero and limits before power", "; ".join(missing), "--from zero"
+            "motors", "zero and limits before power", "; ".join(missing), "--first zero"
         )  # fmt: skip
         return False
     session.do(
@@ -333,6 +333,6 @@ def _hang(session: Session, report: StepReport) -> bool:
     if unsure:
         report.add(
             "drives", "all drives in damping", f"not certain of {', '.join(unsure)}",
-            "check cables and supply; --from drives",
+            "check cables and supply; --first drives",
         )  # fmt: skip
     return not unsure

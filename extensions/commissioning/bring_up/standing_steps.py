@@ -18,7 +18,7 @@ from ....hal.sitting import sitting_path
 from ....mathematics.arrays import Array
 from .session import Request, Session, StepReport
 
-STAND, HOP = "bring_up_stand.yaml", "bring_up_hop.yaml"
+STAND, HOP = "aloft:commissioning/bring_up_stand", "aloft:commissioning/bring_up_hop"
 """The graphs of these steps."""
 SQUAT_DEPTH = 0.05
 """Depth of the squat [m]."""
@@ -49,7 +49,7 @@ def sit(session: Session) -> StepReport:
     if running:
         report.add(
             "drives", "all drives in damping", f"{', '.join(running)} still on",
-            "`aloft robot estop`, then --from watchdog",
+            "`aloft robot estop`, then --first watchdog",
         )  # fmt: skip
     wanted = sitting_path(robot).pose[-1]
     off = session.joint_positions() - wanted
@@ -79,7 +79,7 @@ def hop(rise: float) -> Callable[[Session], StepReport]:
         if report.passed and seen > HEADROOM * max(rise, 0.03):
             report.add(
                 "hop", f"a rise of {100.0 * rise:.0f} cm", f"{100.0 * seen:.1f} cm by its time in the air",
-                "torque constants or masses are wrong: --from motors",
+                "torque constants or masses are wrong: --first motors",
             )  # fmt: skip
         return report
 

@@ -241,7 +241,7 @@ def measure_limits(session: Session) -> StepReport:
             report.add(
                 f"zero of {joint.name}", should, are,
                 f"its zero is off by {shift:+.3f} rad ({np.degrees(shift):+.1f} deg): check the jig and "
-                "the gear's teeth, then --from zero",
+                "the gear's teeth, then --first zero",
             )  # fmt: skip
     if report.passed:
         session.write(_motor_ranges(session, lowest + MARGIN, highest - MARGIN))

@@ -49,7 +49,7 @@ def walk(
             report.add("dead man's switch", "held", str(error), "hold it, and call again to go on")
         except BusError as error:
             report = StepReport()
-            report.add("bus", "answers of all drives", str(error), "check cables; --from drives")
+            report.add("bus", "answers of all drives", str(error), "check cables; --first drives")
         yield record.add(step.name, report)
         if not report.passed:
             return

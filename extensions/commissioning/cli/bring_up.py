@@ -31,10 +31,12 @@ def bring_up(
     first: Annotated[
         str | None,
         typer.Option(
-            "--from", help="The first step; by default the one after the last that passed."
+            "--first", help="The first step; by default the one after the last that passed."
         ),
     ] = None,
-    last: Annotated[str | None, typer.Option("--to", help="The last step; by default all.")] = None,
+    last: Annotated[
+        str | None, typer.Option("--last", help="The last step; by default all.")
+    ] = None,
     yes: Annotated[
         bool, typer.Option("--yes", help="Ask no questions; only where both ports are `twin`.")
     ] = False,

@@ -85,7 +85,6 @@ def run_on_robot(
         AloftError: the graph and the file do not fit.
     """
     from ....logs.recording.recorder import Recorder
-    from ....planner.library.library import shipped_folder
     from ....runtime.graph import load
     from ....runtime.language.stages import ClockSpec
 
@@ -94,7 +93,7 @@ def run_on_robot(
         "robot.armed": True,
         "robot.time": "virtual" if virtual else "real",
     }
-    loaded = load(shipped_folder() / graph, {**on_robot, **settings})
+    loaded = load(graph, {**on_robot, **settings})
     clock = ClockSpec("free" if virtual else "robot")
     return loaded.run(clock=clock, sinks=[Recorder(recording, keep=20)], log=False)
 

@@ -13,7 +13,7 @@ from ....cli.shared.output import console, errors_reported, print_json, say, tab
 
 def deploy(
     graph: Annotated[Path, typer.Argument(help="The graph file.")],
-    to: Annotated[Path, typer.Option("--to", help="The folder to write.")],
+    to: Annotated[Path, typer.Option("--out", "-o", help="The folder to write.")],
     machine: Annotated[
         str, typer.Option(help="The machine; a graph without machines is deployed as a whole.")
     ] = "",

@@ -14,7 +14,7 @@ from ....cli.shared.output import console, errors_reported, print_json, say, tab
 def keys(
     graph: Annotated[Path, typer.Argument(help="The graph file, whose endpoints are tls/...")],
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="The folder to write, or to complete.")
+        Path, typer.Option("--out", "-o", help="The folder to write, or to complete.")
     ] = Path("keys"),
     observer: Annotated[
         list[str] | None,

@@ -280,3 +280,9 @@ def test_errors_say_what_to_do(keys: tuple[PlacedGraph, Path], tmp_path: Path) -
     with pytest.raises(AloftError, match="was made for another graph than"):
         secured(split_over_machines(graph), folder, "far")
     assert host_of("tls/[::1]:7450") == "::1" and host_of("tls/robot.local:7450") == "robot.local"
+
+
+def test_folders_are_the_owners_alone(keys: tuple[PlacedGraph, Path]) -> None:
+    placed, folder = keys
+    found = [folder, *(folder / machine.name for machine in placed.machines)]
+    assert {stat.S_IMODE(path.stat().st_mode) for path in found} == {0o700}

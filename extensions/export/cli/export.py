@@ -33,7 +33,9 @@ Outputs = Annotated[
 @export.command("fmu")
 def fmu(
     graph: GraphPart,
-    to: Annotated[Path, typer.Option("--to", help="The file to write, such as controller.fmu.")],
+    to: Annotated[
+        Path, typer.Option("--out", "-o", help="The file to write, such as controller.fmu.")
+    ],
     fmi: Annotated[str, typer.Option("--fmi", help="The version of FMI, 3.0 or 2.0.")] = "3.0",
     output: Outputs = None,
     set_: Overrides = None,
@@ -86,7 +88,7 @@ def fmu(
 def c(
     graph: GraphPart,
     to: Annotated[
-        Path, typer.Option("--to", help="The folder to write; its name is the library's.")
+        Path, typer.Option("--out", "-o", help="The folder to write; its name is the library's.")
     ],
     target: Annotated[
         str, typer.Option("--target", help="The processor: x86_64, aarch64 or wasm.")

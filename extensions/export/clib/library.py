@@ -151,7 +151,9 @@ def description_in(folder: Path) -> Path:
     if len(found) == 1:
         return found[0]
     if not folder.is_dir():
-        raise AloftError(f"there is no folder {folder}; write it with aloft export c --to {folder}")
+        raise AloftError(
+            f"there is no folder {folder}; write it with aloft export c --out {folder}"
+        )
     many = f"{', '.join(each.name for each in found)}, of which one may be" if found else "none"
     raise AloftError(
         f"{folder} has to have one description NAME.json, as aloft export c writes it; there is {many}"

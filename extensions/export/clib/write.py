@@ -110,7 +110,7 @@ def prepare(
     """
     if not name.isidentifier() or not name.isascii() or name in _KEYWORDS:
         raise AloftError(
-            f"{name!r} cannot be the name of a library; write it as --to my_controller"
+            f"{name!r} cannot be the name of a library; write it as --out my_controller"
         )
     if target not in TARGETS:
         raise AloftError(f"there is no target {target!r}; there is {', '.join(TARGETS)}")

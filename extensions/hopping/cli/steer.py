@@ -47,12 +47,11 @@ def steer(
     quiet: Quiet = False,
 ) -> None:
     """Hop a robot about with the arrow keys: each jump is planned from where it has landed."""
-    from ....planner.library.library import shipped_folder
     from ....runtime.graph import load
 
     out = console(to_stderr=as_json, quiet=quiet)
     with errors_reported(as_json):
-        name = "steer_by_keys.yaml" if commands is None else "steer.yaml"
+        name = "steer_by_keys" if commands is None else "steer"
         settings, about = [*(overrides or [])], {}
         if commands is not None:
             settings.append(f"commands.commands={json.dumps(read_commands(commands))}")
@@ -66,7 +65,7 @@ def steer(
             about = about_robot(robot, "hop", out)
             plan_hops(robot, out)
         with recorder_started(wanted=not no_record) as link:
-            loaded = load(graph or shipped_folder() / name, settings)
+            loaded = load(graph or f"aloft:hopping/{name}", settings)
             messages: list[str] = []
             viewer = open_viewer(rerun, messages)
             default = Path("recordings") / f"{loaded.checked.name}.rrd"

@@ -14,13 +14,14 @@ from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
 from aloft.mathematics.rotations import to_matrix
 from aloft.runtime.loading import checked_file
+from aloft.runtime.loading.reading.files import graph_path
 from aloft.runtime.placement.placed import spread
 from aloft.runtime.running.executor import run
 from aloft.runtime.testing.spread import run_spread
 from aloft.studies.batch.jobs import job_results
 from aloft.studies.expansion import load_cell
 
-GRAPH = Path(aloft.__file__).parent / "graphs" / "steer.yaml"
+GRAPH = graph_path("aloft:hopping/steer")
 
 
 @pytest.mark.long

@@ -22,7 +22,6 @@ from ....extensions.commissioning.identification.robot_calibration import (
     swayed,
 )
 from ....mathematics.arrays import Array
-from ....planner.library.library import shipped_folder
 from ....runtime.graph import Graph, load
 from ....studies.batch.jobs import job_results
 from ...studies.oracle import oracle_values
@@ -108,7 +107,7 @@ def _rms(values: Array) -> float:
 
 
 def _errors_of_robot(seed: int) -> dict[str, Errors]:
-    graph = load(shipped_folder() / "calibrate.yaml").with_seed(seed)
+    graph = load("aloft:commissioning/calibrate").with_seed(seed)
     return errors_of(calibration_from(swayed(graph)), graph)
 
 

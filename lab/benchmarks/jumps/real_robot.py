@@ -29,6 +29,7 @@ from ....planner.task.task import make_task
 from ....robots.description import find_robot
 from ....runtime.graph import Graph, load
 from ....runtime.language.errors import AloftError
+from ....runtime.loading.reading.files import graph_path
 from ....studies.batch.jobs import job_results
 from ....studies.expansion import load_cell
 from ....studies.rehearsing.learning import lesson_of
@@ -159,7 +160,8 @@ def graph_of(
     graphs = shipped_folder()
     include = [graphs / "trials/real.yaml", graphs / "controllers/late_sensors.yaml"]
     if told == "calibration":
-        sway = (graphs / asked.graph).parent / "calibrate.yaml"
+        of_robots = "robots/" if asked.graph.startswith("robots/") else ""
+        sway = graph_path(f"aloft:commissioning/{of_robots}calibrate")
         include.append(calibrated(sway, seed, _owner(asked.robot), asked.robot))
     sets: dict[str, Any] = {
         "plan.task": with_margin(task), "robot.seed": seed, "robot.noise_seed": _NOISES * seed + number,

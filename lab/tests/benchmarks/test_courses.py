@@ -12,7 +12,6 @@ import aloft
 from aloft.lab.benchmarks.changed_targets import BEFORE, KINDS, LIFT_OFF, two_levels
 from aloft.lab.benchmarks.courses import JUMPS, course
 from aloft.lab.benchmarks.stones import STAIRCASE, STEP, STEPS, passed
-from aloft.planner.library.library import shipped_folder
 
 
 def test_a_course_is_that_of_its_seed_and_within_what_is_asked() -> None:
@@ -26,7 +25,7 @@ def test_a_course_is_that_of_its_seed_and_within_what_is_asked() -> None:
 
 def test_the_staircase_has_no_gaps() -> None:
     sets = {"commands.stones": STAIRCASE, "commands.size": STEP}
-    graph = aloft.load(shipped_folder() / "steer_stones.yaml", sets)
+    graph = aloft.load("aloft:hopping/steer_stones", sets)
     (commands,) = (block for block in graph.checked.blocks if block.path == "commands")
     boxes = commands.params.boxes()
     assert len(boxes) == STEPS + 1

@@ -33,6 +33,9 @@ def trace(*, hop: bool = True) -> Trace:
     quaternion = np.zeros((ticks, 4))
     pitch = np.radians(30.0 - 20.0 * np.clip((k - LIFT_OFF) / 99, 0, 1))
     quaternion[:, 1], quaternion[:, 3] = np.sin(pitch / 2), np.cos(pitch / 2)
+    planned = np.zeros((ticks, 4))
+    turn = np.radians(30.0 - 15.0 * np.clip((k - LIFT_OFF) / 99, 0, 1))
+    planned[:, 1], planned[:, 3] = np.sin(turn / 2), np.cos(turn / 2)
     landing = np.zeros((ticks, 2, 3))
     landing[120:, :, 0] = 0.02
     signals = {
@@ -41,7 +44,7 @@ def trace(*, hop: bool = True) -> Trace:
         "robot.truth.contact_position": points, "robot.truth.base_orientation": quaternion,
         "robot.truth.joint_velocity": np.full((ticks, 10), -4.0),
         "robot.joints.torque": np.full((ticks, 10), -7.0), "push.push.force": force,
-        "landing.feet.landing": landing,
+        "landing.feet.landing": landing, "plan.reference.orientation": planned,
     }  # fmt: skip
     return Trace("jump", 0, Outcome(True, "all criteria hold"), k * PERIOD, signals)
 
@@ -57,6 +60,8 @@ def test_numbers_of_a_jump() -> None:
     assert numbers["com_squat_to_apex_cm"] == pytest.approx(22.0, abs=0.1)
     assert numbers["flight_s"] == pytest.approx(0.2)
     assert numbers["pitch_change_in_flight_deg"] == pytest.approx(-20.0)
+    assert numbers["planned_pitch_change_in_flight_deg"] == pytest.approx(-15.0)
+    assert numbers["k_y_at_most_in_thrust_nms"] == pytest.approx(0.02)
     assert numbers["peak_joint_torque_nm"] == 7.0 and numbers["peak_joint_velocity_rad_s"] == 4.0
     assert "flight_s" not in jump_numbers(trace(hop=False))
 

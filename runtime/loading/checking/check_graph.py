@@ -24,6 +24,7 @@ from .background import move_to_background
 from .block_check import BlockDraft, check_defaults, check_emit, check_fit, check_sizes, lacks_robot
 from .composite_wires import resolve_composite_wires
 from .infer_units import infer_quantities, inferred_quantities, unchecked_wires
+from .infer_widths import Widths
 from .inserted import insert_constant, insert_delay, read_values
 from .link_settings import check_paths, check_watchdog, read_link_settings
 from .parameter_references import resolve_references
@@ -43,8 +44,8 @@ def check_graph(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     if graph.empty:
         where = Position(graph.file, 1, 1)
         problems.add(Code.MISSING_KEY, "the graph has no blocks", where, fix="blocks: ...")
-    classes: dict[tuple[str, Path], type[Block]] = {}
-    drafts = {flat.path: _draft(flat, graph, settings, classes, problems) for flat in graph.blocks}
+    drafts = _Drafts(graph, settings, problems).all()
+    graph = replace(graph, blocks=tuple(draft.flat for draft in drafts.values()))
     if settings.base_rate is not None and graph.rate is not None:
         periods = (draft.period_ticks for draft in drafts.values())
         check_hyperperiod(periods, graph.rate.key_where, problems)
@@ -72,25 +73,54 @@ def check_graph(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     return None if len(problems) else checked
 
 
+class _Drafts:
+    """Makes the drafts of all blocks: one whose widths follow from its wires after those it reads."""
+
+    def __init__(self, graph: FlatGraph, settings: Settings, problems: Problems) -> None:
+        self._graph, self._settings, self._problems = graph, settings, problems
+        self._blocks = {flat.path: flat for flat in graph.blocks}
+        self._classes: dict[tuple[str, Path], type[Block] | None] = {}
+        self._made: dict[str, BlockDraft] = {}
+        self._widths = Widths(self._blocks, self._type_of, self._draft_of, settings.robot)
+
+    def all(self) -> dict[str, BlockDraft]:
+        """Return the drafts by path, in the order of the graph."""
+        self._widths.find()
+        return {path: self._draft_of(flat) for path, flat in self._blocks.items()}
+
+    def _type_of(self, flat: FlatBlock) -> type[Block] | None:
+        """Return the class of a block; what is wrong with it is reported once."""
+        key = flat.use, flat.folder
+        if self._classes.get(key) is not None:
+            return self._classes[key]
+        mine = (flat.path, flat.folder)  # a class that is not found is a problem of every block
+        if mine not in self._classes:
+            found = _find(flat, self._graph, self._problems) if flat.use else None
+            self._classes[mine if found is None else key] = found
+        return self._classes.get(key)
+
+    def _draft_of(self, flat: FlatBlock) -> BlockDraft:
+        if flat.path not in self._made:
+            whole, block_type = self._widths.filled(flat), self._type_of(flat)
+            draft = _draft(whole, block_type, self._graph, self._settings, self._problems)
+            self._made[flat.path] = draft
+        return self._made[flat.path]
+
+
 def _draft(
     flat: FlatBlock,
+    block_type: type[Block] | None,
     graph: FlatGraph,
     settings: Settings,
-    classes: dict[tuple[str, Path], type[Block]],
     problems: Problems,
 ) -> BlockDraft:
-    """Make the draft of a block with its class and parameters; ``classes`` holds those found for
-    earlier blocks."""
-    draft = BlockDraft(flat)
+    """Make the draft of a block with its class and parameters."""
+    draft = BlockDraft(flat, block_type)
     if settings.base_rate is not None:
         draft.period_ticks = read_period(flat, settings.base_rate, problems)
         draft.offset_ticks = read_offset(flat, draft.period_ticks, problems)
-    draft.block_type = classes.get((flat.use, flat.folder))
-    if draft.block_type is None and flat.use:
-        draft.block_type = _find(flat, graph, problems)
     if draft.block_type is None:
         return draft
-    classes[flat.use, flat.folder] = draft.block_type
     check_emit(draft, problems)
     draft.params = check_parameters(flat, draft.block_type, problems, settings.robot)
     draft.dimensions = settings.dimensions

@@ -25,9 +25,10 @@ from ...language.flat_graph import (
     plain_slice,
 )
 from ...language.parameters import Parameters
-from ...language.quantities import quantity_of
+from ...language.quantities import UNCHECKED, quantity_of
 from ...language.selection import Selection, runs, select
 from ...language.signals import Field, Signal
+from ..flattening.written_wires import is_name
 from .block_check import BlockDraft
 from .inserted import GatherPiece, gather_block_type, read_values, selected_signal
 from .wire_check import WireCheck
@@ -48,6 +49,8 @@ def resolve_composite_wires(
         excused = list(draft.flat.excused)
         for name, wire in draft.flat.wires.items():
             port = draft.inputs.get(name)
+            if port is not None and not wire.slices and wire.constant is None:
+                wire = _one_field_for_another(draft, port.signal, wire, drafts)
             if not wire.slices or port is None:
                 continue
             composer = _WireComposer(draft, name, wire, drafts, check, names, problems)
@@ -66,6 +69,31 @@ def resolve_composite_wires(
             draft.flat = replace(draft.flat, wires=wires, excused=tuple(excused))
         found[path] = draft
     return found
+
+
+def _one_field_for_another(
+    reader: BlockDraft, wanted: type[Signal], wire: FlatWire, drafts: Mapping[str, BlockDraft]
+) -> FlatWire:
+    """Return the wire as one that selects the source's only field, where only that makes it fit: the
+    fields have other names, or one is a number and the other a vector of one."""
+    source = drafts.get(wire.source_block)
+    output = source.outputs.get(wire.source_port) if source is not None else None
+    if source is None or output is None or output.absent:
+        return wire
+    if len(output.signal.fields) != 1 or len(wanted.fields) != 1:
+        return wire
+    (given,), (asked,) = output.signal.fields.values(), wanted.fields.values()
+    shapes = {source.shape(given), reader.shape(asked)}
+    alike = len(shapes) == 1 or shapes == {(), (1,)}
+    if not alike or None in shapes or (given.name == asked.name and len(shapes) == 1):
+        return wire
+    if given.dtype_name != asked.dtype_name or given.quaternion != asked.quaternion:
+        return wire
+    if not source.quantity(output.name, given.name).agrees(quantity_of(asked) or UNCHECKED):
+        return wire
+    inner = FlatWire(wire.source, wire.where, truth=wire.truth)
+    element = WireElement(wire.where, inner)
+    return replace(wire, source="", slices=(WireSlice("", wire.where, (element,)),))
 
 
 @dataclass
@@ -133,6 +161,15 @@ class _WireComposer:
                     fix=f"{similar[0]}: {text_of(plain_slice(wire_slice))}" if similar else "",
                 )
                 return None
+            literal = wire_slice.items[0].literal if wire_slice.items else None
+            if literal is not None and is_name(literal) and fields[name].values is None:
+                self._report(
+                    f"{self.at}: {name} cannot be {text_of(plain_slice(wire_slice))}",
+                    literal.where,
+                    expected="a source, block.port.field, or a number",
+                    found=text_of(plain_slice(wire_slice)),
+                )
+                return None
             found[name] = wire_slice
         missing = [name for name in fields if name not in found]
         if missing:
@@ -166,6 +203,14 @@ class _WireComposer:
         start = 0
         types: dict[str, WireElement] = {}
         for item in wire_slice.items:
+            if item.literal is not None and not wire_slice.is_list:
+                filled = self._constant_field(name, field, item)
+                if filled is None:
+                    return
+                numbers, shape = filled
+                self.pieces.append(GatherPiece(name, numbers=numbers))
+                self.fields[name] = (shape, field.dtype_name)
+                return
             if item.literal is not None:
                 values = self._numbers(name, field, item)
                 if values is None:
@@ -199,6 +244,21 @@ class _WireComposer:
         ):
             shape = wanted if wanted == () and start == 1 else (start,)
         self.fields[name] = (shape, next(iter(types), field.dtype_name))
+
+    def _constant_field(
+        self, name: str, field: Field, item: WireElement
+    ) -> tuple[tuple[float, ...], tuple[int, ...]] | None:
+        """Return the numbers of a field that is a constant beside wired ones, and its shape: one number is
+        that of all elements."""
+        assert item.literal is not None
+        shape = self.reader.shape(field)
+        node = MapNode((Entry(name, item.where, item.literal),), item.where)
+        before = len(self.problems)
+        values = read_values(node, self.signal, self.reader, self.at, self.problems)
+        if len(self.problems) > before or shape is None:
+            return None
+        filled = np.broadcast_to(np.asarray(values[name], np.float64), shape)
+        return tuple(filled.ravel().tolist()), shape
 
     def _numbers(self, name: str, field: Field, item: WireElement) -> tuple[float, ...] | None:
         """Numbers between sources, as those of a constant."""

@@ -24,7 +24,7 @@ from ...language.quantities import UNCHECKED, InputQuantities, OutputQuantities,
 from ...language.signals import Field, Signal
 from ...language.stages import BlockSpec, Wire
 from ...language.unit_algebra import ONE
-from ...language.units import QUANTITY, Unit, parse_quantity, parse_unit
+from ...language.units import QUANTITY, Unit, parse_quantity, parse_unit, unit_in
 from .block_check import BlockDraft
 
 
@@ -259,13 +259,11 @@ def own_unit(node: Node) -> Unit | None:
     means the same in all of them.
     """
     if isinstance(node, ScalarNode):
-        if isinstance(node.value, str):
-            match = QUANTITY.match(node.value)
-            if match is not None:
-                try:
-                    return parse_unit(match["unit"])
-                except UnitError:
-                    return ONE  # reported with the value
+        if isinstance(node.value, str) and QUANTITY.match(node.value) is not None:
+            try:
+                return parse_unit(unit_in(node.value))
+            except UnitError:
+                return ONE  # reported with the value
         return None if node.value in (0, False) else ONE
     found = [own_unit(item) for item in (node.items if isinstance(node, ListNode) else ())]
     units = [unit for unit in found if unit is not None]
@@ -291,8 +289,11 @@ def _array(node: Node, field: Field, owner: BlockDraft) -> tuple[Any, str]:
     own = field.unit
     if field.inferred:
         own = own_unit(node) or ONE
+    names = {} if field.values is None else {each.name: int(each) for each in field.values}
+    if names:
+        expected = f"{listing(names)}, or {expected}"
     try:
-        value = _numbers(node, own, types)
+        value = _numbers(node, own, types, names)
         array = np.asarray(value, np.float64)
     except (TypeError, ValueError, OverflowError):
         return None, expected
@@ -303,10 +304,14 @@ def _array(node: Node, field: Field, owner: BlockDraft) -> tuple[Any, str]:
     return value, ""
 
 
-def _numbers(node: Node, unit: Unit | None, types: tuple[type, ...]) -> Any:
-    """Plain numbers. Raises ``ValueError`` for anything else."""
+def _numbers(
+    node: Node, unit: Unit | None, types: tuple[type, ...], names: Mapping[str, int]
+) -> Any:
+    """Plain numbers, also for the ``names`` of an enumeration. Raises ``ValueError`` for anything else."""
     if isinstance(node, ScalarNode):
         value = node.value
+        if isinstance(value, str) and value.upper() in names:
+            return names[value.upper()]
         if isinstance(value, str) and unit is not None:
             try:
                 return parse_quantity(value, unit.text)
@@ -317,7 +322,7 @@ def _numbers(node: Node, unit: Unit | None, types: tuple[type, ...]) -> Any:
         return value
     if isinstance(node, MapNode):
         raise TypeError("a mapping is not a number")
-    return [_numbers(item, unit, types) for item in node.items]
+    return [_numbers(item, unit, types, names) for item in node.items]
 
 
 def _short(node: Node) -> str:

@@ -127,6 +127,8 @@ class WireCheck:
         missing = [n for n in port.signal.fields if n not in output.signal.fields]
         if missing:
             selected = [f"{wire.source}.{n}" for n in _fitting(source, output, port)]
+            one = _one_element(source, output, target, port)
+            selected = selected or ([f"{wire.source}.{one}"] if one else [])
             candidates = self._local(selected[:3] or self._candidates(target, port), at, wire)
             self.problems.add(
                 Code.FIELD_MISSING,
@@ -144,10 +146,29 @@ class WireCheck:
                 f"{at} does not fit {written}: {mismatch.message}",
                 wire.where,
                 **other,
-                expected=mismatch.expected,
+                expected=mismatch.expected + self._width_of(target, name, mismatch),
                 found=mismatch.found,
                 fix=mismatch.fix,
             )
+
+    def _width_of(self, target: BlockDraft, name: str, mismatch: Mismatch) -> str:
+        """Return where the width that an input has comes from, if it follows from another wire."""
+        field = (
+            next(iter(target.inputs[name].signal.fields.values()))
+            if name in target.inputs
+            else None
+        )
+        size = field.shape[0] if field is not None and len(field.shape) == 1 else None
+        entry = target.flat.parameters.get(size) if isinstance(size, str) else None
+        if mismatch.code is not Code.SHAPE or entry is None or entry.key_where != target.flat.where:
+            return ""
+        for other, port in target.inputs.items():
+            wire = target.flat.wires.get(other)
+            if other == name or wire is None:
+                continue
+            if any(field.shape == (size,) for field in port.signal.fields.values()):
+                return f", as {target.flat.path}.{other} from {wire.shown or wire.source}"
+        return ""
 
     def check_output(self, at: str, wire: FlatWire) -> None:
         """Report a sub-graph's output whose source does not exist."""
@@ -256,6 +277,17 @@ def _fitting(source: BlockDraft, output: Output[Any], port: Input[Any]) -> Itera
             yield name
 
 
+def _one_element(
+    source: BlockDraft, output: Output[Any], target: BlockDraft, port: Input[Any]
+) -> str:
+    """Return ``field[0]`` where an input of one number reads an output of one vector; else nothing."""
+    if len(output.signal.fields) != 1 or len(port.signal.fields) != 1:
+        return ""
+    (given,), (wanted,) = output.signal.fields.values(), port.signal.fields.values()
+    one = target.shape(wanted) in ((), (1,)) and len(source.shape(given) or ()) == 1
+    return f"{given.name}[0]" if one and given.dtype_name == wanted.dtype_name else ""
+
+
 def _signal_text(signal: type[Signal]) -> str:
     return f"{signal.__name__} {{{listing(signal.fields, 8)}}}"
 
@@ -307,9 +339,9 @@ def compare(
 
 
 def _says_unit(source: BlockDraft) -> bool:
-    """Return whether the source is a block whose parameter ``unit`` may still be set."""
-    fields = type(source.params).model_fields if source.params is not None else {}
-    return "unit" in fields and source.flat.parameters.get("unit") is None
+    """Return whether the source is a block whose parameter ``unit`` may still be set: neither it nor a
+    number such as ``3 A`` says it."""
+    return getattr(source.params, "unit", None) == "" and source.flat.parameters.get("unit") is None
 
 
 def _compare_units(
@@ -317,7 +349,13 @@ def _compare_units(
 ) -> Iterator[Mismatch]:
     if given is None or wanted.unit is None or given.matches(wanted.unit):
         return
-    if given.same_dimension(wanted.unit):
+    if given.offset != wanted.unit.offset:
+        zeros = (f"{unit}, whose zero is {unit.offset:g}" for unit in (wanted.unit, given))
+        yield Mismatch(
+            Code.UNIT, f"field {name!r} has another zero", *zeros,
+            "convert it in a block between: blocks.Expression, such as u + 273.15",
+        )  # fmt: skip
+    elif given.same_dimension(wanted.unit):
         factor = given.factor_to(wanted.unit)
         yield Mismatch(
             Code.UNIT,

@@ -12,7 +12,7 @@ from ....files.document import read_file, read_mapping
 from ....files.nodes import Entry, MapNode, Node, ScalarNode, plain
 from ....files.problems import Code, Position, Problems
 from ...language.flat_graph import FlatBlock, FlatGraph, FlatWire
-from ..reading.files import FileTree, Stack, addresses_like, is_another_kind
+from ..reading.files import PREFIX, FileTree, Stack, files_like, is_another_kind
 from ..reading.overrides import (
     Override,
     Overrides,
@@ -76,14 +76,17 @@ class _GraphDraft:
 
 def flatten_file(path: Path, overrides: Overrides, problems: Problems) -> FlatGraph:
     """Flatten the graph in a file; what is wrong is reported to ``problems`` and left out."""
-    similar = () if path.exists() else addresses_like(path)
+    similar = () if path.exists() else files_like(path.as_posix(), path.parent)
     if similar:
+        shipped = similar[0].startswith(PREFIX)
         problems.add(
             Code.FILE,
             f"cannot read {path}: no such file",
             Position(str(path), 0, 0),
             nearest=similar,
-            fix=f"{similar[0]}, which is shipped; 'aloft graph' lists all",
+            fix=f"{similar[0]}, which is shipped; 'aloft graph' lists all"
+            if shipped
+            else similar[0],
         )
         return _Flattener(problems).run(path, None, overrides)
     return _Flattener(problems).run(path, read_file(path, str(path), problems), overrides)

@@ -106,6 +106,10 @@ def _read_fields(
         if isinstance(value, MapNode):
             wrong_kind(value, f"field {key!r} of {at}", _ITEM_EXAMPLE, problems, at=at)
             return None
+        if is_name(value):  # of a value of an enumeration, if the field has any
+            literal = WrittenWire(value.where, literal=value)
+            slices.append(WireSlice(key, entry.key_where, (literal,)))
+            continue
         wire_slice = _read_slice(key, value, prefix, instance, at, problems)
         if wire_slice is None:
             return None
@@ -157,6 +161,12 @@ def is_number(node: ScalarNode) -> bool:
     if not isinstance(node.value, str):
         return node.value is not None
     return QUANTITY.match(node.value) is not None
+
+
+def is_name(node: Node) -> bool:
+    """Return whether a value is a word without a dot, which is no source."""
+    value = node.value if isinstance(node, ScalarNode) else None
+    return isinstance(value, str) and value.isidentifier() and QUANTITY.match(value) is None
 
 
 def _all_numbers(node: Node) -> bool:

@@ -28,6 +28,10 @@ FOLDER = Path(__file__).parents[3] / "graphs"
 """The graphs of the core."""
 
 
+ALIKE = 0.75
+"""Similarity, from 0 to 1, above which a shipped graph may be meant by the name of a missing file."""
+
+
 def graph_folders() -> dict[str, Path]:
     """Return the folders of shipped graphs by what their addresses begin with: ``aloft:`` for the core's,
     ``aloft:hopping/`` for those of an extension."""
@@ -72,8 +76,13 @@ def addresses_like(path: Path) -> tuple[str, ...]:
         for prefix, folder in graph_folders().items()
         for file in folder.rglob("*.yaml")
     }
-    wanted = f"{PREFIX}{str(path.with_suffix('')).removeprefix(PREFIX).removeprefix('graphs/')}"
-    return (wanted,) if wanted in known else nearest(wanted, sorted(known))
+    wanted = str(path.with_suffix("")).removeprefix(PREFIX).removeprefix("graphs/")
+    if f"{PREFIX}{wanted}" in known:
+        return (f"{PREFIX}{wanted}",)
+    # Without the prefix, which all have, and only what differs by a letter or two: a file of one's own
+    # that is missing is not a shipped one.
+    names = sorted(each.removeprefix(PREFIX) for each in known)
+    return tuple(f"{PREFIX}{each}" for each in nearest(wanted, names, cutoff=ALIKE))
 
 
 def files_like(name: str, folder: Path) -> tuple[str, ...]:

@@ -171,6 +171,9 @@ class ClockKeys(_Keys):
     late_after: Annotated[float, Field(gt=0.0, le=100.0)] = _key(
         "the share of a period after its deadline at which a tick is late: 0.1"
     )
+    late_share: Annotated[float, Field(ge=0.0, le=1.0)] = _key(
+        "the largest share of late ticks with which a run is a success; by default any"
+    )
     hangs_after: Seconds = _key("the time after which a call of a block is taken to hang")
 
 

@@ -419,6 +419,9 @@ def test_a_fall_does_not_end_the_run_but_says_why(bench):
     metrics = bench.block.metrics()
     assert metrics["safety_reason"] == "the base leant more than `tilt_limit`"
     assert "success" not in metrics and bench.clock.stop_reason is None
+    assert metrics["veto"] == (
+        "block: the base leant more than `tilt_limit`; the robot was damped from 0.02 s on"
+    )
 
 
 def test_a_foot_switch_at_fault_ends_the_run_when_the_robot_may_stop(bench):

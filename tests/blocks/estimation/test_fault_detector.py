@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from aloft.blocks.control.dynamics import Dynamics
-from aloft.blocks.estimation.fault_detector import FaultDetector, Suspect
+from aloft.blocks.estimation.fault_detector import FaultDetector
+from aloft.blocks.estimation.fault_detector_state import Stop, Suspect
 from aloft.blocks.signals import CommandMode, Phase
 from aloft.mathematics.constants import GRAVITY
 from aloft.robots.description import find_robot
@@ -202,3 +203,107 @@ def test_the_first_suspect_stays():
     stand.bench.set("joints", position=2.0)
     stand.run(3)
     assert stand.state.suspect == Suspect.SWITCHES and stand.state.tick == tick
+
+
+# Gross errors before lift-off: units, signs, axes
+
+
+def ended_by(standing, ticks=50):
+    """How many ticks the run lasted, and the reason for which the block ended it."""
+    for tick in range(ticks):
+        standing.bench.step()
+        if standing.state.stop != Stop.NONE:
+            assert standing.bench.stop_reason == standing.bench.block._stop_reason()
+            return tick, str(standing.bench.block.metrics()["reason"])
+    return ticks, ""
+
+
+GRAVITY_ERRORS = {
+    "0.102": (lambda a: 0.102 * a, "it looks like g in place of m/s^2"),
+    "-z": (lambda a: a * [1, 1, -1], "the sign of z looks wrong"),
+    "-all": (lambda a: -a, "the sign of all axes"),
+    "x and z": (lambda a: a[[2, 1, 0]], "the order of x and z looks wrong"),
+    "y and z": (lambda a: a[[0, 2, 1]], "the order of y and z looks wrong"),
+    "2 g": (lambda a: 2.0 * a, "its length is 2.00 g"),
+    "nan": (lambda a: a * np.nan, ""),
+}
+
+
+@pytest.mark.parametrize("error", GRAVITY_ERRORS)
+@pytest.mark.parametrize("name", ["bruce", "go2"])
+def test_an_accelerometer_that_does_not_read_gravity_at_rest_ends_the_run(name, error):
+    change, looks = GRAVITY_ERRORS[error]
+    standing = Standing(name, tilt=0.05)
+    standing.bench.set("imu", specific_force=change(standing.gravity))
+    ticks, reason = ended_by(standing)
+    assert ticks <= 2 and "m/s^2 at rest, where the legs say (" in reason
+    assert looks in reason and "correct the driver or the IMU's mounting" in reason
+
+
+@pytest.mark.parametrize("tilt", [-0.25, 0.25])
+def test_a_slope_and_a_bump_are_no_gross_error(tilt):
+    standing = Standing()
+    # The base is level on a slope by its estimate, so the reading leans against the soles.
+    leaning = GRAVITY * np.array([np.sin(tilt), 0.0, np.cos(tilt)])
+    standing.bench.set("imu", specific_force=leaning)
+    assert ended_by(standing) == (50, "")
+    standing.bench.set("imu", specific_force=3.0 * leaning)
+    standing.bench.step(2)
+    standing.bench.set("imu", specific_force=leaning)
+    assert ended_by(standing) == (50, "")
+
+
+def test_gravity_is_judged_in_the_stand_and_at_rest_only():
+    standing = Standing(gross_rate=0.0)
+    standing.bench.step(3)
+    standing.bench.set("imu", specific_force=0.0)
+    for phase in (Phase.SQUAT, Phase.FLIGHT, Phase.RECOVER):
+        standing.bench.set("phase", phase=phase, stance=True)
+        assert ended_by(standing) == (50, "")
+    standing.bench.set("phase", phase=Phase.STAND, stance=True)
+    standing.bench.set("joints", velocity=1.5)
+    assert ended_by(standing) == (50, "")
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize(
+    ("factor", "looks"),
+    [(-1.0, ": its sign looks wrong"), (180.0 / np.pi, ": it looks like degrees per second")],
+)
+def test_a_gyroscope_that_turns_otherwise_than_the_base_ends_the_run(axis, factor, looks):
+    standing = Standing()
+    rate = np.zeros(3)
+    rate[axis] = 0.3
+    first = standing.jacobian.shape[1] - len(standing.robot.joints)
+    base = np.concatenate([np.zeros(3), rate])
+    # the joints' speeds with which points stay where they are
+    speed = np.linalg.lstsq(
+        standing.jacobian[:, first:], -standing.jacobian[:, :6] @ base, rcond=None
+    )[0]
+    slip = standing.jacobian[:, :6] @ base + standing.jacobian[:, first:] @ speed
+    assert np.abs(slip).max() < 0.1, "or feet slide"
+    standing.bench.set("joints", velocity=speed)
+    standing.bench.set("imu", angular_velocity=rate)
+    assert ended_by(standing, 6) == (6, "")
+    standing.bench.set("imu", angular_velocity=factor * rate)
+    ticks, reason = ended_by(standing)
+    assert ticks == 4, "lateness and gross_time are borne"
+    assert reason.startswith(f"{standing.bench.block.context.path}: the gyroscope's axis")
+    assert looks in reason
+
+
+def test_in_the_thrust_five_times_as_much_is_borne_and_in_flight_anything():
+    for phase, rate, ends in (
+        (Phase.THRUST, 1.9, False), (Phase.THRUST, 2.1, True), (Phase.FLIGHT, 9.0, False),
+        (Phase.SQUAT, 0.45, True), (Phase.SQUAT, 0.35, False),
+    ):  # fmt: skip
+        standing = Standing(gyroscope_error=0.0)
+        standing.bench.set("phase", phase=phase, stance=True)
+        standing.bench.set("imu", angular_velocity=[0.0, rate, 0.0])
+        assert bool(ended_by(standing)[1]) == ends, (phase, rate)
+
+
+def test_gross_errors_are_not_judged_where_their_limit_is_zero():
+    standing = Standing(gross_gravity=0.0, gross_rate=0.0)
+    standing.bench.set("imu", specific_force=-standing.gravity, angular_velocity=5.0)
+    assert ended_by(standing) == (50, "")

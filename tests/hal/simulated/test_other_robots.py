@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -12,8 +13,9 @@ import pytest
 from aloft.blocks.signals import CommandMode
 from aloft.hal.simulated.mujoco_model import build_mujoco_model
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
+from aloft.hal.simulated.stance import StartError
 from aloft.hal.simulated.unsupported import unsupported_motor
-from aloft.robots.description import RobotDescription
+from aloft.robots.description import RobotDescription, find_robot
 from aloft.runtime.language.context import Clock, Context
 from aloft.runtime.testing.bench import BlockBench
 
@@ -178,3 +180,41 @@ def test_runs_of_other_robots_can_be_restored_exactly(cart_pole: Data) -> None:
     robot.restore(kept)
     robot.step(20)
     assert robot.snapshot() == expected
+
+
+HOPPER = """<mujoco model="hopper"><worldbody><body name="torso" pos="0 0 1">
+  <joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/>{pitch}
+  <geom type="sphere" size=".1" mass="5"/><body name="leg"><joint name="hip" axis="0 1 0" range="-60 60"/>
+  <geom type="capsule" fromto="0 0 0 0 0 -.5" size=".03" mass="1"/></body></body></worldbody>
+  <actuator><motor joint="hip" ctrlrange="-20 20"/></actuator>
+  <keyframe><key name="home" qpos="0 0 0 0.5"/></keyframe></mujoco>"""
+
+
+def test_a_robot_without_feet_begins_from_rest_in_its_pose_and_falls(tmp_path: Path) -> None:
+    (tmp_path / "robot.xml").write_text(HOPPER.format(pitch='<joint name="pitch" axis="0 1 0"/>'))
+    hopper = find_robot("robot.xml", tmp_path)
+    assert hopper.base_joint == "planar" and not hopper.feet
+    robot = BlockBench(MujocoRobot, {}, robot=hopper)
+    start = truth(robot)
+    place, speed = start.base_position.copy(), start.base_linear_velocity.copy()
+    assert start.joint_position == pytest.approx([0.5], abs=1e-3)
+    assert np.abs(speed).max() < 0.03, "a period of physics after rest"
+    robot.set("command", mode=CommandMode.DAMPING)
+    for _ in range(500):
+        robot.step()
+    fallen = truth(robot).base_position
+    assert fallen[2] < place[2] - 0.05 and np.isfinite(fallen).all()
+
+
+def test_a_robot_with_feet_need_not_stand() -> None:
+    bruce = find_robot("bruce")
+    turned = {f"{side}_{joint}": angle for side in ("left", "right")
+              for joint, angle in (("hip_pitch", 0.1), ("ankle", 0.7))}  # fmt: skip
+    leaning = bruce.changed(standing={**bruce.standing, **turned})
+    with pytest.raises(StartError, match=r"with `start: \{stand: false\}` it begins in that pose"):
+        BlockBench(MujocoRobot, {}, robot=leaning)
+    robot = BlockBench(MujocoRobot, {"start": {"stand": False}}, robot=leaning)
+    assert truth(robot).joint_position == pytest.approx(leaning.standing_position, abs=1e-3)
+    uneven = bruce.changed(standing={**bruce.standing, "left_knee": -1.2})
+    robot = BlockBench(MujocoRobot, {"start": {"stand": False}}, robot=uneven)
+    assert truth(robot).joint_position == pytest.approx(uneven.standing_position, abs=5e-3)

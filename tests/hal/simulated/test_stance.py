@@ -136,7 +136,7 @@ def test_a_pose_that_tips_over(quadruped: Data) -> None:
     quadruped["links"][0]["com"] = [0.35, 0.0, 0.0]
     assert failure(quadruped) == (
         "stand as its description says when it is held in its standing pose for 0.3 s: its centre "
-        "of mass is 36 mm outside its contact points, so it tips over"
+        "of mass is 36 mm outside its contact points, so it tips over; with `start: {stand: false}` it begins in that pose and falls if it falls"
     )
 
 
@@ -174,7 +174,7 @@ def test_an_arm_that_its_motors_cannot_hold(arm: Data) -> None:
     arm["profiles"]["motor"]["peak_torque"] = 2.0
     assert failure(arm) == (
         "stay as its description says when it is held in its standing pose for 0.3 s: motor "
-        "shoulder_motor has 2 N m and would need 2.76 N m"
+        "shoulder_motor has 2 N m and would need 2.76 N m; with `start: {stand: false}` it begins in that pose and falls if it falls"
     )
 
 

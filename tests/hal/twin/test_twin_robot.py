@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,19 @@ def test_it_stands_by_itself_when_it_is_commanded_to() -> None:
     assert set(health.condition.tolist()) == {0x80}
     assert health.joints_valid and health.imu_valid and health.contacts_valid
     assert not health.age.any() and health.imu_age == 0.0
+
+
+def test_it_does_not_wait_for_warm_windings_when_it_closes(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = bench(windings={"temperature": 60.0, "ambient": 45.0, "copper": 0.0039})
+    hold(robot)
+    robot.step(5)
+    driver = robot.block.driver
+    assert driver is not None and driver.cooling == 5
+    assert driver.loop.measured.temperature.max() > driver.hardware.board.cooled
+    monkeypatch.setattr(time, "sleep", lambda seconds: pytest.fail("it waited in real time"))
+    robot.block.close()
+    assert driver.cooling == 0 and robot.block.twin.board.cooling == 0
+    assert robot.block.waits_for_others, "where closing takes its time, that is no hang"
 
 
 @pytest.mark.long

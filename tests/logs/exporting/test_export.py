@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 
+import aloft
 from aloft import load
 from aloft.logs.exporting.difference import ComparisonError, compare_runs, lift_off_tick
 from aloft.logs.exporting.export import EXPORTS, ExportError, export, export_mcap, export_parquet
@@ -145,6 +146,16 @@ def test_quaternions_come_back_from_matrices() -> None:
     quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
     back = quaternions_of_matrices(matrices_of_quaternions(quaternions))
     np.testing.assert_allclose(np.abs((back * quaternions).sum(axis=1)), 1.0, atol=1e-12)
+
+
+def test_a_filter_finds_the_zeros_of_a_column_of_zeros(tmp_path: Path) -> None:
+    zeros = {"use": "blocks.Constant", "with": {"value": [0.0]}}
+    result = aloft.load({"rate": "10 Hz", "duration": "1 s", "blocks": {"zero": zeros}}).run()
+    aloft.write_recording(tmp_path / "a.rrd", result)
+    export_parquet(read(tmp_path / "a.rrd"), tmp_path / "a.parquet")
+    for rule in (("in", [0.0]), ("==", 0.0), ("<=", 0.0), (">=", 0.0)):
+        found = parquet.read_table(tmp_path / "a.parquet", filters=[("zero.y.value[0]", *rule)])
+        assert len(found) == 10, rule
 
 
 def test_parquet_has_joints_and_units(runs: list[RecordedRun], tmp_path: Path) -> None:

@@ -167,13 +167,13 @@ def test_any_prefix_is_useful(whole: Path, tmp_path: Path) -> None:
 
 
 def test_a_window_reads_only_what_it_needs(whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from aloft.logs.file import reader
+    from aloft.logs.file import packed_rows
 
     run = read(whole)
     _ = run.ticks
     asked: list[int] = []
-    unpack = reader.unpack
-    monkeypatch.setattr(reader, "unpack", lambda data: asked.append(1) or unpack(data))
+    unpack = packed_rows.unpack
+    monkeypatch.setattr(packed_rows, "unpack", lambda data: asked.append(1) or unpack(data))
     ticks, rows = run.window(25, 35)
     assert ticks.tolist() == list(range(25, 35))
     assert rows.tobytes() == written_rows(rows.shape[1])[25:35].tobytes()

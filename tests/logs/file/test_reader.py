@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import aloft
 from aloft import load
 from aloft.logs import RecordingError, read
-from aloft.logs.file.format import Header
+from aloft.logs.file.format import FORMAT, Header
 from aloft.logs.file.header import header_of
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.recording.writer import RecordingWriter
@@ -144,7 +145,7 @@ def test_what_is_no_recording_is_said_so(tmp_path: Path) -> None:
         read(tmp_path / "other.rrd")
 
 
-@pytest.mark.parametrize("number, what", [(99, "update aloft"), (3, "read it with an older one")])
+@pytest.mark.parametrize("number, what", [(99, "update aloft to "), (3, "read it with aloft ")])
 def test_another_format_is_refused(
     bound: BoundGraph, tmp_path: Path, number: int, what: str
 ) -> None:
@@ -152,6 +153,6 @@ def test_another_format_is_refused(
 
     header = replace(header_of(bound), format=number)
     RecordingWriter(tmp_path / "a.rrd", header).close()
-    match = f"has format {number}, this version of aloft reads 5; {what}"
+    match = f"has format {number}, this version of aloft reads {FORMAT}; {what}{aloft.__version__}"
     with pytest.raises(RecordingError, match=match):
         read(tmp_path / "a.rrd")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
+from aloft.logs.file.code import code_of, remember
 from aloft.logs.file.format import Header, RecordedLayout
 from aloft.logs.file.header import header_of
 from aloft.logs.file.reader import read
@@ -94,6 +95,8 @@ def record(graph: CheckedGraph, path: Path) -> None:
     writer.write_rows(np.array(result.log.ticks), result.log.rows())
     writer.write_outcome(result.to_json())
     writer.close()
+    assert graph.resolved is not None
+    remember(code_of(graph.resolved))  # as a recorder does
 
 
 def test_unchanged_files_are_used_as_they_are(project: Path) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aloft.logs.file.code import code_of, remember
 from aloft.logs.file.header import machine, make_header
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.logs.replay.opened_run import OpenedRun
@@ -81,6 +82,8 @@ def record(folder: Path, **settings: Any) -> RunResult:
         writer.write_notes([parameter_note(change)])
     writer.write_outcome(result.to_json())
     writer.close()
+    assert graph.resolved is not None
+    remember(code_of(graph.resolved))  # as a recorder does
     return result
 
 

@@ -270,7 +270,7 @@ def test_missing_ticks() -> None:
     gap = KeptRun(**{**vars(whole), "ticks": whole.ticks[kept], "all_rows": whole.all_rows[kept]})
     done = replay(gap)
     assert done.identical and done.signals.compared == 880
-    with pytest.raises(ReplayError, match=r"ticks 400 to 419 were not recorded.*--from 420"):
+    with pytest.raises(ReplayError, match=r"ticks 400 to 419 were not recorded.*--from-tick 420"):
         replay(gap, inputs="recorded")
     assert replay(gap, inputs="recorded", first_tick=500).identical
     late = KeptRun(**{**vars(whole), "ticks": whole.ticks[300:], "all_rows": whole.all_rows[300:]})

@@ -110,7 +110,36 @@ def test_statements_are_numpys() -> None:
     three(columns, A, np.zeros(3), np.ones((3, 3)))
     three(own_elements, a, A)
     three(views, b, np.zeros(6))
+    three(functions, A, a, b[:3].copy(), np.zeros(3), np.zeros(8))
     three(whole, np.array([-7, 2, 8]), np.zeros(3))
+
+
+TABLE = np.array([1.0, 2.0, 3.0])
+
+
+@kernel
+def gained(x: float, gain: float = 2.0, offset: float = 0.0) -> float:
+    return gain * x + offset
+
+
+@kernel
+def functions(A: Matrix3, u: Vector3, w: Vector3, y: Vector3, r: Array1D) -> None:
+    """What people write: functions of arrays, arrays of the kernel's own, names of arguments."""
+    y[:] = np.clip(u, -1.0, 1.0) + np.where(w > 0.0, w, TABLE) * np.minimum(u, w)
+    y[:] += np.cross(u, np.dot(A, w)) / np.linalg.norm(u) + np.outer(u, w)[1] + np.sin(w)
+    t = np.zeros(3)
+    for i, (a, b) in enumerate(zip(u, w, strict=True)):
+        t[i] = a - b
+    both = u + t
+    both *= 2.0
+    y[u > 0.0] = gained(w[0], offset=0.5)
+    y[w < 0.0] += both[w < 0.0]
+    r[0], r[1], r[2] = np.sum(A), u.max(), sum(u)
+    r[3], r[4], r[5] = np.argmax(both), np.mean(A @ u), np.eye(3)[1] @ np.array([w[2], 1.0, 2.0])
+    if (x := r[0]) > 0.0 and np.any(u < 0.0):
+        r[6] = x
+    for row in A:
+        r[7] += row[0] * row[-1]
 
 
 @kernel
@@ -181,6 +210,31 @@ def test_whole_numbers_at_the_limit_are_exact() -> None:
 
 
 @kernel
+def made_in_a_loop(u: Vector3, y: Vector3) -> None:
+    last = u
+    for i in range(3):
+        t = u * i
+        y[:] = last
+        last = t
+
+
+@kernel
+def unknown_argument(y: Vector3) -> None:
+    y[0] = gained(1.0, factor=2.0)
+
+
+@kernel
+def of_unknown_size(a: Array1D, y: Array1D) -> None:
+    t = a * 2.0
+    y[:] = t
+
+
+@kernel
+def selected(u: Vector3, y: Vector3) -> None:
+    y[0] = np.sum(u[u > 0.0])
+
+
+@kernel
 def beyond(a: Vector3, y: Vector3) -> None:
     y[:] = a * a[3]
 
@@ -212,6 +266,16 @@ def changing_step(a: Array1D, k: int) -> None:
         (below, "a[-4] is beyond a: the indices of its 3 elements are -3 to 2"),
         (unequal, "shapes (3,) and (2,) do not fit together"),
         (turned, "A is written while another part of it is read; use another array"),
+        (
+            made_in_a_loop,
+            "last would keep an array that the loop makes anew; make both before the loop",
+        ),
+        (unknown_argument, "gained has no argument 'factor'; it has x, gain, offset"),
+        (of_unknown_size, "this makes a new array: assign it into one, as in scratch.x[:] = ..."),
+        (
+            selected,
+            "a mask selects elements in y[mask] = ...; for others write a loop, or np.where",
+        ),
         (changing_step, "the step of a[::k] is not a constant"),
     ],
 )

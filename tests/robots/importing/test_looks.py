@@ -236,3 +236,30 @@ def test_a_mesh_with_a_corner_that_is_nowhere_is_refused(tmp_path: Path, corner:
     file.write_text("v 0 0 0\n")
     with pytest.raises(ValueError, match="a mesh of 0 triangles"):
         mesh_triangles(file)
+
+
+def test_a_mesh_of_few_lines_that_asks_for_a_billion_triangles(tmp_path: Path) -> None:
+    """Each node has the next one ten times: 10^9 triangles in ten nodes."""
+    inner = "".join('<instance_node url="#n{k}"/>' for _ in range(10))
+    nodes = (
+        "".join(f'<node id="n{k}">{inner.format(k=k + 1)}</node>' for k in range(9))
+        + '<node id="n9"><instance_geometry url="#g"/></node>'
+    )
+    text = (
+        COLLADA[: COLLADA.index("<library_visual_scenes")]
+        if "<library_visual_scenes" in COLLADA
+        else COLLADA
+    )
+    scene = f'<library_visual_scenes><visual_scene id="s">{nodes}</visual_scene></library_visual_scenes>'
+    (tmp_path / "a.dae").write_text(text + scene + "</COLLADA>")
+    with pytest.raises(ValueError, match=r"nodes in one another|triangles; expected"):
+        mesh_triangles(tmp_path / "a.dae")
+
+
+def test_a_mesh_that_is_no_file_or_too_large_is_not_read(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="no file, or one of more than 256 MiB"):
+        mesh_triangles(Path("/dev/zero").with_name("zero.stl"))
+    with (tmp_path / "sparse.stl").open("wb") as file:
+        file.truncate(84 + 50 * 10**9)
+    with pytest.raises(ValueError, match="256 MiB"):
+        mesh_triangles(tmp_path / "sparse.stl")

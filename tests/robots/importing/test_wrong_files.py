@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import yaml
 
-from aloft.robots.description import RobotError, find_robot
+from aloft.robots.description import RobotError, find_robot, read
+from aloft.robots.importing.new_yaml import new_yaml
 
 from .model_files import ARM, INERTIAL
 
@@ -246,3 +248,75 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     assert report(tmp_path, "x.yaml")[0] == "x.yaml:1:7: there is no file nowhere.urdf"
     with pytest.raises(LookupError, match=r"no robot description at .*nowhere\.urdf"):
         find_robot("nowhere.urdf", tmp_path)
+
+
+LINKS = "".join(f'<link name="{name}">{INERTIAL}</link>' for name in ("foot", "trunk", "leg"))
+HIP = (
+    '<joint name="hip" type="revolute"><parent link="trunk"/><child link="leg"/><origin rpy="{rpy}"/><axis xyz="0 1 0"/>'
+    '<limit lower="{lower}" upper="{upper}" effort="9" velocity="9"/></joint>'
+)
+FREE = '<joint name="free" type="floating"><parent link="foot"/><child link="trunk"/></joint>'
+FIXED = '<joint name="free" type="fixed"><parent link="foot"/><child link="trunk"/></joint>'
+
+
+def refusal(folder: Path, text: str, name: str = "robot.urdf") -> str:
+    (folder / name).write_text(text)
+    with pytest.raises(RobotError) as refused:
+        read(folder / name)
+    return str(refused.value)
+
+
+def test_a_floating_joint_below_another_body(tmp_path: Path) -> None:
+    said = refusal(
+        tmp_path,
+        f'<robot name="r">{LINKS}{FREE}{HIP.format(rpy="0 0 0", lower=-1, upper=1)}</robot>',
+    )
+    assert "a floating joint holds a body to another body: free of trunk on foot" in said
+    assert '<link name="world"/> as the parent of free in place of foot' in said
+    inner = '<mujoco><worldbody><body name="a"><geom size="1"/><body name="b"><freejoint/><geom size="1"/></body></body></worldbody></mujoco>'
+    assert "b_joint of b on a" in refusal(tmp_path, inner, "robot.xml")
+
+
+def test_angles_that_look_like_degrees(tmp_path: Path) -> None:
+    said = refusal(
+        tmp_path,
+        f'<robot name="r">{LINKS}{FIXED}{HIP.format(rpy="0 90 0", lower=-1, upper=1)}</robot>',
+    )
+    assert "joint hip has angles that look like degrees, and a URDF's are radians" in said
+    assert 'rpy="0 1.57079633 0"' in said
+    (tmp_path / "robot.urdf").write_text(
+        f'<robot name="r">{LINKS}{FIXED}{HIP.format(rpy="0 3.14159 0", lower=-90, upper=90)}</robot>'
+    )
+    assert any(
+        'limits of joint hip look like degrees, lower="-90" upper="90"' in note and 'lower="-1.57079633" upper="1.57079633"' in note
+        for note in read(tmp_path / "robot.urdf").notes
+    )  # fmt: skip
+
+
+def test_a_graph_that_is_called_as_the_robots_file(tmp_path: Path) -> None:
+    (tmp_path / "robot.yaml").write_text("rate: 500 Hz\nrobot: robot.urdf\nblocks: {}\n")
+    said = refusal(
+        tmp_path,
+        f'<robot name="r">{LINKS}{FIXED}{HIP.format(rpy="0 0 0", lower=-1, upper=1)}</robot>',
+    )
+    assert (
+        "robot.yaml beside robot.urdf is a graph" in said
+        and "rename the graph, such as to run_robot.yaml" in said
+    )
+
+
+def test_links_and_joints_may_be_called_by_numbers(tmp_path: Path) -> None:
+    numbered = f'<robot name="7">{LINKS}{FIXED}{HIP.format(rpy="0 0 0", lower=-1, upper=1)}</robot>'
+    for name, number in (("trunk", "1"), ("leg", "02"), ("hip", "3")):
+        numbered = numbered.replace(f'"{name}"', f'"{number}"')
+    (tmp_path / "robot.urdf").write_text(numbered)
+    added = {
+        "weld": [3], "feet": [{"name": "tip", "at": "02", "radius": 0.02}], "points": {"top": [1, [0, 0, 0]]},
+        "thrusters": {"fan": {"link": 1, "max_thrust": 3}},
+    }  # fmt: skip
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump({"file": "robot.urdf", **added}))
+    robot = read(tmp_path / "mine.yaml").description
+    assert not robot.joints and robot.feet[0].name == "tip"
+    written = new_yaml(tmp_path / "robot.urdf", tmp_path / "robot.yaml").text
+    (tmp_path / "robot.yaml").write_text(written)
+    assert [joint.name for joint in read(tmp_path / "robot.yaml").description.joints] == ["3"]

@@ -174,7 +174,6 @@ def test_a_selection_of_truth_needs_leave(folder: Path) -> None:
             "p.y.position[7]: [7] is outside of 3 elements, which count from 0",
             "",
         ),
-        ("p.y.position", "g.u does not fit p.y.position: field 'value' has another shape", ""),
         ("p.y.on", "g.u does not fit p.y.on: field 'value' has another element type", ""),
         ("[p.y.on, p.y.angle]", "p.y.on is bool and p.y.angle is float64", ""),
         ("{valu: p.y.angle}", "Vector has no field 'valu'", "value: p.y.angle"),
@@ -236,3 +235,69 @@ def test_comments_and_quotes_keep_their_brackets(folder: Path) -> None:
         "    in: {u: 'p.y.position[ 0 ]'}  # a.b[1]\n"
     )
     assert graph_of(folder, blocks).run(log=True).signal("g.y.value")[-1].tolist() == [1.0]
+
+
+COMMAND = """\
+rate: 500 Hz
+duration: 10 ms
+robot: bruce
+blocks:
+  robot: {{use: hal.MujocoRobot, with: {{seed: 0}}, in: {{command: {{mode: {mode}, torque: {torque}, position: {position},
+    velocity: 0, stiffness: {stiffness}, damping: 1.5}}}}}}
+  tau: {{use: blocks.Constant, with: {{n: 1, value: {ten}, unit: N m}}}}
+"""
+TEN = [0.1 * k for k in range(10)]
+
+
+def commanded(tmp_path: Path, **given: object) -> Any:
+    text = {"mode": "ACTIVE", "torque": "tau.y.value", "position": 0.1, "stiffness": 60, "ten": TEN}
+    written = COMMAND.format(**{**text, **given}).replace("n: 1, ", "")
+    with Graph(checked_text(written, tmp_path / "g.yaml")).open() as run:
+        run.step()
+        return run.block("robot").command
+
+
+@pytest.mark.parametrize(
+    ("given", "mode", "torque", "position", "stiffness"),
+    [
+        ({}, 1, TEN, [0.1] * 10, [60.0] * 10),
+        ({"mode": 2, "torque": 0}, 2, [0.0] * 10, [0.1] * 10, [60.0] * 10),
+        ({"mode": "damping", "position": TEN}, 2, TEN, TEN, [60.0] * 10),
+        ({"stiffness": "600 N cm/rad", "torque": TEN}, 1, TEN, [0.1] * 10, [6.0] * 10),
+    ],
+)
+def test_fields_may_be_constants_beside_wired_ones_or_alone(
+    tmp_path: Path, given: dict[str, Any], mode: int, torque: Any, position: Any, stiffness: Any
+) -> None:
+    found = commanded(tmp_path, **given)
+    assert int(found.mode) == mode
+    assert found.torque.tolist() == pytest.approx(torque)
+    assert found.position.tolist() == pytest.approx(position)
+    assert found.stiffness.tolist() == pytest.approx(stiffness)
+    assert found.damping.tolist() == [1.5] * 10
+
+
+@pytest.mark.parametrize(
+    ("given", "message", "expected"),
+    [
+        ({"mode": "ACTVE"}, "mode cannot be ACTVE", "OFF, ACTIVE, DAMPING, or a whole number"),
+        (
+            {"stiffness": "tau"},
+            "stiffness cannot be tau",
+            "a source, block.port.field, or a number",
+        ),
+        (
+            {"position": [1, 2]},
+            "position cannot be [1, 2]",
+            "a finite number in rad, or a list of shape [10]",
+        ),
+        ({"position": [1, 2], "torque": 0}, "position cannot be [1, 2]", "of shape [10]"),
+    ],
+)
+def test_constants_that_do_not_fit(
+    tmp_path: Path, given: dict[str, Any], message: str, expected: str
+) -> None:
+    with pytest.raises(LoadError) as caught:
+        commanded(tmp_path, **given)
+    (found,) = caught.value.report.problems
+    assert found.message == f"robot.command: {message}" and expected in found.expected

@@ -15,7 +15,7 @@ PART = "inputs: {u: a signal}\noutputs: {y: gain.y}\nblocks:\n  gain: {use: bloc
 @pytest.mark.parametrize(
     ("file", "kind", "fix"),
     [
-        ("graphs/studies/controller.yaml", "a study", "aloft study {}"),
+        ("graphs/studies/formulations.yaml", "a study", "aloft study {}"),
         ("graphs/studies/paper.yaml", "a study", "aloft study {}"),
         ("graphs/tasks/in_situ.yaml", "a task of the jump planner", "aloft plan {}"),
         ("graphs/tasks/go2_in_situ_10cm.yaml", "a task of the jump planner", "aloft plan {}"),

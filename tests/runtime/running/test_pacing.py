@@ -176,6 +176,13 @@ def test_the_limit_of_lateness_is_a_share_of_the_period() -> None:
     assert with_late_system(ClockSpec("paced"), 0.11).run().overruns == 49
 
 
+def test_a_graph_may_say_how_many_ticks_may_be_late() -> None:
+    result = with_late_system(ClockSpec("paced", late_share=0.4), 0.98).run()
+    assert not result.success
+    assert result.reason == "25 of 50 ticks began late, at most 40 % may (clock.late_share)"
+    assert with_late_system(ClockSpec("paced", late_share=0.5), 0.98).run().success
+
+
 def test_late_wake_ups_end_the_run_where_the_policy_is_to_stop() -> None:
     result = with_late_system(ClockSpec("paced", "stop", 3), 0.5).run()
     assert result.reason == (

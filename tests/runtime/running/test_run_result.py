@@ -29,6 +29,10 @@ def test_the_first_block_that_judges_without_success_gives_the_reason() -> None:
     assert (failure, success_reason) == ("it fell", "it stands")
     assert list(merged) == ["tilt", "speed"], "those of blocks that judge come first"
     assert merge_metrics({"worse": {"success": False}})[1] == "block 'worse' reports no success"
+    vetoed: dict[str, dict[str, object]] = {"a": {"veto": "damped"}, "b": {"success": True}}
+    assert merge_metrics(vetoed) == ({}, "damped", None)  # type: ignore[arg-type]
+    judged = {**vetoed, "b": {"success": False, "reason": "fell"}}
+    assert merge_metrics(judged)[1] == "fell"  # type: ignore[arg-type]
     assert merge_metrics({"quiet": {"success": True}})[1:] == (None, None)
     # a reason without a verdict is nobody's
     assert merge_metrics({"talker": {"reason": "well"}}) == ({}, None, None)

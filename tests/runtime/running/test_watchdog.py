@@ -120,6 +120,18 @@ def test_stop_cycles_that_hang_are_ended_one_by_one() -> None:
     assert Robot.rests >= 5  # the other block had its turn
 
 
+def test_what_ended_the_run_comes_before_what_hung_afterwards() -> None:
+    for failed, reason in (
+        (lambda self: {"success": False, "reason": "too hot"}, "too hot; "),
+        (lambda self: {}, ""),
+    ):
+        _, result = hanging(lambda: None, close=lambda self: sleeping(), metrics=failed)
+        assert result.exit_code is ExitCode.RUN_FAILED
+        assert (
+            result.reason == f"{reason}block 'arm.robot' failed in close: it did not return in time"
+        )
+
+
 def test_a_block_that_waits_for_others_has_a_limit_of_its_own() -> None:
     _, result = hanging(lambda: time.sleep(3 * LIMIT), waits_for_others=True)
     assert result.exit_code is ExitCode.SUCCESS
@@ -169,6 +181,21 @@ def test_what_nothing_interrupts_is_abandoned_in_damping() -> None:
     assert done.stdout.splitlines() == [*["stop cycle"] * 5, "close"]
     assert "block 'robot' hung at tick 0 (0.000 s): it did not return within 0.4 s" in done.stderr
     assert "nothing interrupts it\n  it is at <string>:16\n" in done.stderr
+    assert done.returncode == ExitCode.RUN_FAILED
+
+
+def test_the_first_cause_is_said_where_closing_is_abandoned() -> None:
+    program = ABANDONED.replace("def step(self):", "def close(self):", 1).replace(
+        '    def close(self):\n        print("close", flush=True)\n',
+        '    def step(self):\n        raise ValueError("the true cause")\n',
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        check=False, capture_output=True, text=True, timeout=240, env={**os.environ},
+    )  # fmt: skip
+    assert done.stdout.splitlines() == ["stop cycle"] * 5
+    cause = "block 'robot' failed at tick 0 (0.000 s): ValueError: the true cause; then block 'robot' hung"
+    assert cause in done.stderr
     assert done.returncode == ExitCode.RUN_FAILED
 
 

@@ -83,7 +83,7 @@ def test_what_is_refused(study: Path, folder: Path, call_json: CallJson) -> None
     def reason(*options: str) -> str:
         return str(call_json("falsify", "count_far.yaml", *options, code=2)["reason"])
 
-    assert reason("--output", "test_a.py") == "--output goes with --keep"
+    assert reason("--test", "test_a.py") == "--test goes with --keep"
     study.write_text(STUDY.replace("falsify:\n", "falsify:\n  where: {task: []}\n"))
     problems = call_json("falsify", "count_far.yaml", code=2)["problems"]
     assert problems[0]["expected"] == "at least one value"

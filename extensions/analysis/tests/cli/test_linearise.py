@@ -24,7 +24,7 @@ def loop(tmp_path: Path) -> str:
 def test_margins_of_an_opened_loop_as_json_and_pictures(loop: str, tmp_path: Path) -> None:
     png, svg = tmp_path / "loop.png", tmp_path / "loop.svg"
     drawn = ("--png", str(png), "--svg", str(svg))
-    told = run_for_json("linearise", loop, "--from", "k.y", "--open", "--at", "0.1", *drawn)
+    told = run_for_json("linearise", loop, "--input", "k.y", "--open", "--at", "0.1", *drawn)
     assert told["states"] == ["x/u~delay.past.value[0, 0]", "x.x.value[0]"]
     # with one tick of delay the phase is -180 deg where w T = 60 deg, and there |L| = K T
     assert told["margins"]["together"]["gain_up"] == pytest.approx(1.0 / 0.3, rel=1e-2)
@@ -35,7 +35,9 @@ def test_margins_of_an_opened_loop_as_json_and_pictures(loop: str, tmp_path: Pat
 
 
 def test_a_model_as_a_table(loop: str) -> None:
-    out = run_here("linearise", loop, "--from", "k.y", "--to", "x.y", "--when", "x.y < 0.9").stdout
+    out = run_here(
+        "linearise", loop, "--input", "k.y", "--output", "x.y", "--when", "x.y < 0.9"
+    ).stdout
     assert "2 states, 1 inputs, 1 outputs, period 10 ms" in out
     assert "slowest poles" in out
 
@@ -45,9 +47,9 @@ def test_a_root_locus_as_json_table_and_picture(loop: str, tmp_path: Path) -> No
     asked = (
         "linearise",
         loop,
-        "--from",
+        "--input",
         "k.y",
-        "--to",
+        "--output",
         "x.y",
         "--at",
         "0.1",
@@ -69,7 +71,7 @@ def test_a_response_measured_with_a_chirp_beside_the_model(loop: str, tmp_path: 
     asked = (
         "linearise",
         loop,
-        "--from",
+        "--input",
         "k.y",
         "--at",
         "0.1",
@@ -92,7 +94,7 @@ def test_a_response_measured_with_a_chirp_beside_the_model(loop: str, tmp_path: 
     exact = 30.0 * T / (z * (z - 1.0))
     assert np.array(measured["real"]) == pytest.approx(exact.real, rel=1e-3, abs=1e-4)
     assert svg.read_text().count("<use") > len(z)  # points
-    out = run_here(*asked, "--to", "x.y").stdout
+    out = run_here(*asked, "--output", "x.y").stdout
     assert "k.y.value[0] to x.y.value[0]: 12 periods with a chirp" in " ".join(out.split())
     assert "the model lies within the intervals at" in out
 
@@ -100,13 +102,13 @@ def test_a_response_measured_with_a_chirp_beside_the_model(loop: str, tmp_path: 
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["--from", "k.y", "--open", "--at", "1", "--locus", "k.gain=1:2"], "leave out --open"),
-        (["--from", "k.y"], "say about which instant: --at 0.4 or --when"),
-        (["--from", "k.y", "--to", "x.y", "--at", "1", "--png", "a.png"], "diagrams show an opened loop"),
-        (["--from", "k.y", "--at", "1", "--chirp", "1", "--locus", "k.gain=1:2"], "ask for one of them"),
-        (["--from", "k.y", "--at", "1", "--chirp", "1", "--band", "50"], "--band cannot be '50'; write it as --band 1:50"),
-        (["--from", "k.y", "--at", "1", "--chirp", "1", "--seeds", "few"], "--seeds cannot be 'few'"),
-        (["--from", "k.z", "--at", "1"], "there is no signal 'k.z'"),
+        (["--input", "k.y", "--open", "--at", "1", "--locus", "k.gain=1:2"], "leave out --open"),
+        (["--input", "k.y"], "say about which instant: --at 0.4 or --when"),
+        (["--input", "k.y", "--output", "x.y", "--at", "1", "--png", "a.png"], "diagrams show an opened loop"),
+        (["--input", "k.y", "--at", "1", "--chirp", "1", "--locus", "k.gain=1:2"], "ask for one of them"),
+        (["--input", "k.y", "--at", "1", "--chirp", "1", "--band", "50"], "--band cannot be '50'; write it as --band 1:50"),
+        (["--input", "k.y", "--at", "1", "--chirp", "1", "--seeds", "few"], "--seeds cannot be 'few'"),
+        (["--input", "k.z", "--at", "1"], "there is no signal 'k.z'"),
     ],
 )  # fmt: skip
 def test_wrong_questions(loop: str, arguments: list[str], text: str) -> None:

@@ -1,4 +1,4 @@
-"""``aloft study --sensitivity`` on the command line."""
+"""``aloft sensitivity`` on the command line."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -11,6 +11,7 @@ import pytest
 import aloft
 from aloft.extensions.commissioning.blocks.motor_drift import MotorDrift
 from aloft.robots.description import find_robot
+from aloft.runtime.loading.reading.files import graph_path
 from aloft.runtime.testing.bench import BlockBench
 from aloft.studies.expansion import load_cell
 
@@ -85,9 +86,9 @@ def test_a_warm_robot_is_not_taken_for_a_heavy_one() -> None:
     graphs = Path(aloft.__file__).parent / "graphs"
     runs = {}
     for name, more, sets in (
-        ("cold", "", {}), ("warm", "", WARM), ("followed", "warm_motors.yaml", WARM),
+        ("cold", "", {}), ("warm", "", WARM), ("followed", "aloft:commissioning/controllers/warm_motors", WARM),
     ):  # fmt: skip
-        behind = [graphs / "controllers" / more] if more else []
+        behind = [graph_path(more)] if more else []
         graph = load_cell(graphs / "jump.yaml", [], sets, graphs / "warm.yaml", behind)
         runs[name] = graph.run(log=False)
         assert runs[name].success, name

@@ -164,7 +164,7 @@ def test_a_person_walks_stops_and_goes_on(
 
 @contextmanager
 def served(folder: Path, *, held: bool, gantry: dict[str, Any]) -> Iterator[Path]:
-    """A twin under power as `aloft twin --virtual --write` serves it; gives the file that it writes."""
+    """A twin under power as `aloft twin --virtual --out` serves it; gives the file that it writes."""
     params = SimulatorParameters(seed=2, start=StartParameters(gantry=gantry))
     twin = Wiring.of(ROBOT).twin(ROBOT, params, held=held)
     with TwinServer(twin, virtual=True, period=0.001) as server:

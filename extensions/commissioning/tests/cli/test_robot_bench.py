@@ -102,12 +102,12 @@ def test_bring_up_on_the_twin(tmp_path: Path) -> None:
     path.write_text(yaml.safe_dump(Hardware.for_twin(ROBOT).model_dump(mode="json")))
     text = run_here("robot", "bring-up", str(path), code=2)
     assert "give --yes" in text.stdout + text.stderr
-    before_power = ("robot", "bring-up", str(path), "--yes", "--to", "switches")
+    before_power = ("robot", "bring-up", str(path), "--yes", "--last", "switches")
     found = json.loads(run_here(*before_power, "--json").stdout)
     assert found["success"] and found["steps"][-1]["step"] == "switches"
     again = json.loads(run_here(*before_power, "--json").stdout)
     assert again["steps"] == []
-    text = run_here("robot", "bring-up", str(path), "--yes", "--to", "jump", code=2)
+    text = run_here("robot", "bring-up", str(path), "--yes", "--last", "jump", code=2)
     assert "there is no step 'jump': robot, drives, directions," in text.stdout + text.stderr
 
 

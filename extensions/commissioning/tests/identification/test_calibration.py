@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -51,8 +50,9 @@ from aloft.hal.simulated.variation import draw_variation
 from aloft.lab.studies.oracle import oracle_values, reading_ages
 from aloft.robots.description import find_robot
 from aloft.robots.pinocchio_model import build_pinocchio_model
+from aloft.runtime.loading.reading.files import graph_path
 
-GRAPH = Path(aloft.__file__).parent / "graphs" / "calibrate.yaml"
+GRAPH = graph_path("aloft:commissioning/calibrate")
 ROBOT = find_robot("bruce")
 
 

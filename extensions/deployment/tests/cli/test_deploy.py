@@ -77,7 +77,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def deploy(machine: str, to: Path, *more: str) -> dict[str, object]:
-    arguments = ("deploy", "twins.yaml", "--machine", machine, "--to", str(to), *more)
+    arguments = ("deploy", "twins.yaml", "--machine", machine, "--out", str(to), *more)
     return run_for_json(*arguments, code=0)
 
 
@@ -120,7 +120,7 @@ def test_all_that_is_missing_is_said_at_once(here: Path) -> None:
     (here / "full").mkdir()
     (here / "full" / "mine.txt").touch()
     done = outcome(
-        "deploy", "twins.yaml", "--machine", "ground", "--to", str(here / "full"),
+        "deploy", "twins.yaml", "--machine", "ground", "--out", str(here / "full"),
         "--set", "controller.gains=../elsewhere.txt", "--keys", "keys", "--wheels", str(here),
     )  # fmt: skip
     assert done.returncode == 2 and not done.stdout
@@ -150,7 +150,7 @@ def test_all_that_is_missing_is_said_at_once(here: Path) -> None:
     ],
 )  # fmt: skip
 def test_what_is_refused(here: Path, options: tuple[str, ...], said: str) -> None:
-    done = outcome("deploy", "twins.yaml", "--to", "there", *options)
+    done = outcome("deploy", "twins.yaml", "--out", "there", *options)
     assert done.returncode in (2, 3) and said in " ".join(done.stderr.split())
     assert not Path("there").exists()
 
@@ -205,7 +205,7 @@ def test_deployed_parts_run_in_a_chroot_and_a_network_of_their_own(
     short = ("--set", "duration=400 ms")
     for machine in ("onboard", "ground"):
         to = str(machines / machine)
-        run_here("deploy", str(graph), "--machine", machine, "--to", to, *short)
+        run_here("deploy", str(graph), "--machine", machine, "--out", to, *short)
     zipfile.ZipFile(wheel).extractall(installed)
     program = installed / "bin" / "aloft"
     program.parent.mkdir()

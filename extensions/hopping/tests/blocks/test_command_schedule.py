@@ -1,8 +1,8 @@
 """``CommandSchedule`` gives each command at its time, when the one before has been taken."""
 
 from aloft.extensions.hopping.blocks.command_schedule import CommandSchedule
-from aloft.planner.library.library import shipped_folder
 from aloft.runtime.loading import checked_file
+from aloft.runtime.loading.reading.files import graph_path
 from aloft.runtime.testing import BlockBench
 
 
@@ -31,5 +31,7 @@ def test_a_command_that_is_not_due_waits_though_the_one_before_is_taken() -> Non
 
 
 def test_the_graph_knows_how_many_there_are() -> None:
-    checked = checked_file(shipped_folder() / "steer.yaml", ["commands.commands=[{ahead: 10 cm}]"])
+    checked = checked_file(
+        graph_path("aloft:hopping/steer"), ["commands.commands=[{ahead: 10 cm}]"]
+    )
     assert {b.path: b for b in checked.blocks}["score"].params.jumps == 1

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from aloft.extensions.hopping.blocks.gamepad import Gamepad
-from aloft.planner.library.library import shipped_folder
 from aloft.runtime.graph import load
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.testing import BlockBench
@@ -66,7 +65,7 @@ def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyP
     monkeypatch.setitem(sys.modules, "pygame", None)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(AloftError, match=r"pip install 'pygame"):
-        load(shipped_folder() / "steer_by_gamepad.yaml")
+        load("aloft:hopping/steer_by_gamepad")
 
 
 def test_a_gamepad_that_closes_leaves_another_its_events() -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from aloft.extensions.hopping.blocks.stepping_stones import SteppingStones, SteppingStonesParameters
-from aloft.planner.library.library import shipped_folder
 from aloft.runtime.graph import load
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.testing import BlockBench
@@ -53,7 +52,7 @@ def test_drawn_stones_follow_from_their_seed_and_keep_their_bounds() -> None:
 
 def test_the_robot_stands_on_the_ground_that_they_make() -> None:
     checked = load(
-        shipped_folder() / "steer_stones.yaml", {"commands.stones": GIVEN, "commands.seen": 1}
+        "aloft:hopping/steer_stones", {"commands.stones": GIVEN, "commands.seen": 1}
     ).checked
     blocks = {block.path: block for block in checked.blocks}
     assert blocks["score"].params.jumps == 3
@@ -68,16 +67,16 @@ def test_the_robot_stands_on_the_ground_that_they_make() -> None:
 
 def test_stones_that_overlap_are_refused() -> None:
     with pytest.raises(AloftError, match="stone 2 overlaps the one before it"):
-        load(shipped_folder() / "steer_stones.yaml", {"commands.stones": [{"x": 0.25}, {"x": 0.3}]})
+        load("aloft:hopping/steer_stones", {"commands.stones": [{"x": 0.25}, {"x": 0.3}]})
     with pytest.raises(AloftError, match="gap must be two positive lengths"):
-        load(shipped_folder() / "steer_stones.yaml", {"commands.random.gap": [0.1, 0.05]})
+        load("aloft:hopping/steer_stones", {"commands.random.gap": [0.1, 0.05]})
 
 
 @pytest.mark.long
 def test_bruce_hops_up_and_down_and_repeats_to_the_byte() -> None:
     stones = [{"x": 0.22, "y": 0.01, "top": 0.04}, {"x": 0.44, "top": 0.0}]
     runs = [
-        load(shipped_folder() / "steer_stones.yaml", {"commands.stones": stones}).run(log=False)
+        load("aloft:hopping/steer_stones", {"commands.stones": stones}).run(log=False)
         for _ in range(2)
     ]
     assert runs[0].success, runs[0].reason

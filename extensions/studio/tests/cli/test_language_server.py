@@ -105,6 +105,29 @@ def test_other_yaml_is_left_alone() -> None:
     assert is_graph(TEXT) and not is_graph("name: bruce\nlinks: []\n")
 
 
+OWN = """\
+rate: 500 Hz
+blocks:
+  own: {use: "of_the_workspace:Own"}
+  gain: {use: blocks.Gain, with: {gain: 2, gian: 3}, in: {u: own.y}}
+"""
+
+
+def test_no_module_of_the_workspace_is_imported(tmp_path: Path) -> None:
+    marker = tmp_path / "marker"
+    (tmp_path / "of_the_workspace.py").write_text(
+        f'from pathlib import Path\nPath({str(marker)!r}).touch()\n\nclass Own:\n    """My block."""\n'
+    )
+    path = tmp_path / "graph.yaml"
+    found = problems_of(OWN, path)
+    assert [p.message.split(":")[0] for p in found] and all("gian" in p.message for p in found)
+    graph = GraphText(OWN, path)
+    assert graph.hover(*at("of_the_workspace:Own", OWN)) == "**of_the_workspace:Own**\n\nMy block."
+    where = graph.definition(*at("of_the_workspace:Own", OWN))
+    assert where is not None and (Path(where.file).name, where.line) == ("of_the_workspace.py", 4)
+    assert not marker.exists() and "of_the_workspace" not in sys.modules
+
+
 def test_a_missing_extra_is_one_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "lsprotocol", None)
     with pytest.raises(AloftError, match=r"needs pygls: pip install 'pygls"):

@@ -21,7 +21,7 @@ from aloft.runtime.graph import Graph
 
 @pytest.fixture(scope="module")
 def graph() -> Graph:
-    return aloft.load("aloft:calibrate.yaml").with_seed(5)
+    return aloft.load("aloft:commissioning/calibrate").with_seed(5)
 
 
 def found_exactly(graph: Graph, **changed: Any) -> Calibration:

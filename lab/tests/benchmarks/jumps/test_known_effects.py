@@ -56,7 +56,7 @@ def test_the_robot_that_sways_has_the_effect_and_the_one_that_jumps_is_told(
     assert asked == [({"robot.sensors.imu.gyro_delay": "2 ms"}, 3)]
     for graph in told:
         robot = graph.block("robot").params
-        assert (robot.imu.gyro_delay, robot.seed) == (0.002, 3)
+        assert (robot.sensors.imu.gyro_delay, robot.seed) == (0.002, 3)
         assert graph.block("timing").params.rate == 0.002
         assert graph.block("plan").params.task["effort"] == EFFORT
 

@@ -40,7 +40,7 @@ def test_what_is_told_changes_the_controller_and_not_the_robot() -> None:
     untold, told = (graph_of(97000, told, asked, asked.task, 1).checked for told in ("nothing", "draws"))  # fmt: skip
     for block in ("timing", "weight", "wbc"):
         assert untold.block(block).params != told.block(block).params
-    for field in ("imu", "motors", "encoders", "joints", "links", "seed", "noise_seed"):
+    for field in ("sensors", "actuators", "body", "ground", "seed", "noise_seed"):
         a, b = (getattr(each.block("robot").params, field) for each in (untold, told))
         assert a == b
 
@@ -63,7 +63,7 @@ def test_a_row_whose_place_is_measured_is_that_row_with_a_sensor() -> None:
     assert asked[SEEN].task == asked[TEN].task and asked[SEEN].graph == asked[TEN].graph
     graph = graph_of(97000, "draws", asked[SEEN], asked[SEEN].task, 1)
     wires = graph.checked.block("ahead").wires
-    assert wires["measured_base"].source == "place.base"
+    assert wires["measured_base"].source == "pose.base"
     assert wires["measured_joints"].source == "timing.joints", "late sensors are as without it"
     assert graph.checked.block("capture").block_type.__name__ == "MotionCapture"
 

@@ -1,0 +1,233 @@
+"""Keeps what studies found as data files with the commit of the code that ran, makes pages' tables of them, and says
+which are stale.
+
+::
+
+    python lab/pages/study_data.py keep [--commit C] RESULTS ...   a data file and tables from folders of `aloft study`
+    python lab/pages/study_data.py stale                           what has changed since, by data file; exit 1 if any
+    python lab/pages/study_data.py mark                            write that below the tables
+
+A data file is ``docs/data/STUDY.json``. Its table stands in the pages of ``PAGES`` between ``<!-- data: STUDY -->`` and
+``<!-- end of data: STUDY -->``, and a test holds the two together. A table is stale if the files in ``measures`` of its data
+file have changed since its commit. ``older`` are tables that were made before there were data files: their commit is
+that of their last change.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+DATA = "docs/data"
+PAGES: Mapping[str, tuple[str, ...]] = {
+    "paper_controller": ("docs/comparisons.md",),
+    "paper_factors": ("docs/comparisons.md",),
+    "paper_polar": ("docs/landing.md",),
+    "paper_pushes": ("docs/landing.md",),
+}
+CONTROLLER = (
+    "blocks",
+    "mathematics",
+    "graphs/controllers",
+    "graphs/trials",
+    "graphs/jump.yaml",
+    "hal/simulated",
+    "robots/bruce",
+)
+"""What the outcome of a jump depends on."""
+STANDS_TILT = 5.0
+"""deg, at rest; the paper's criterion in words is that the robot lands stably."""
+OUTCOMES = ("n", "successes", "stands")
+
+
+def rows_of(folder: Path, labels: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the cells of a study's results, each with its values of ``labels`` and counts of its runs.
+
+    A run *stands* if it did not fall and its torso is at most 5 degrees from upright at the end; a run that was ended
+    by a fall has no final tilt.
+    """
+    from pyarrow import parquet
+
+    runs = parquet.read_table(folder / "runs.parquet").to_pylist()
+    found: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for run in runs:
+        key = tuple(run[label] for label in labels)
+        row = found.setdefault(
+            key, {**dict(zip(labels, key, strict=True)), **dict.fromkeys(OUTCOMES, 0), "misses": {}}
+        )
+        tilt = run.get("final_tilt_deg")
+        row["n"] += 1
+        row["successes"] += bool(run["success"])
+        row["stands"] += tilt is not None and tilt < STANDS_TILT
+        if not run["success"]:
+            miss = kind_of_miss(run["reason"])
+            row["misses"][miss] = row["misses"].get(miss, 0) + 1
+    return list(found.values())
+
+
+def labels_of(folder: Path) -> list[str]:
+    """Return the names of a study's axes that have more than one value."""
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    rows = summary["rows"]
+    known = ("task", "arm", "feet", "steps")
+    return [name for name in known if name in rows[0] and len({str(row[name]) for row in rows}) > 1]
+
+
+def kind_of_miss(reason: str) -> str:
+    """Return why a run is no success, in a word or two."""
+    kinds = {
+        "fell": "fell", "flight of": "flight too short", "rose": "rise", "jumped": "place", "turned": "turn",
+        "tilt": "tilt", "torso": "tilt", "joint": "joint limit", "slid": "feet slid", "moved": "feet slid",
+        "step": "stepped", "touch": "touched",
+    }  # fmt: skip
+    return next((kind for text, kind in kinds.items() if text in reason), "other")
+
+
+def table_of(data: Mapping[str, Any]) -> str:
+    """Return the Markdown table of a data file."""
+    labels = data["labels"]
+    lines = [
+        f"| {' | '.join(labels)} | stands | succeeds | misses |",
+        "|" + "---|" * (len(labels) + 3),
+    ]
+    for row in data["rows"]:
+        misses = sorted(row["misses"].items(), key=lambda item: (-item[1], item[0]))
+        told = ", ".join(f"{count} {kind}" for kind, count in misses) or "-"
+        shown = " | ".join(str(row[label]) for label in labels)
+        counts = f"{row['stands']} of {row['n']} | {row['successes']} of {row['n']}"
+        lines.append(f"| {shown} | {counts} | {told} |")
+    seeds = data["seeds"]
+    alike = len({row["n"] for row in data["rows"]}) == 1
+    each = "" if alike else " (a row has as many as it has runs, from the first)"
+    made = f"Seeds {seeds[0]} to {seeds[-1]}{each}, code of commit {data['commit'][:8]}."
+    return "\n".join([*lines, "", made]) + "\n"
+
+
+def replaced(text: str, mark: str, inside: str) -> str:
+    """Return a page's text with ``inside`` between the marks of a data file.
+
+    Raises:
+        ValueError: the page does not have both marks.
+    """
+    begin, end = f"<!-- data: {mark} -->\n", f"<!-- end of data: {mark} -->"
+    before, found, rest = text.partition(begin)
+    _, closed, after = rest.partition(end)
+    if not (found and closed):
+        raise ValueError(f"there is no {begin.strip()} with an {end} behind it")
+    return before + begin + inside + end + after
+
+
+def between(text: str, mark: str) -> str:
+    """Return what stands between the marks of a data file; empty where they are not."""
+    return text.partition(f"<!-- data: {mark} -->\n")[2].partition(f"<!-- end of data: {mark} -->")[
+        0
+    ]
+
+
+def git(root: Path, *arguments: str) -> str:
+    """Return what a git command prints; empty if it fails, as where the history is not there."""
+    done = subprocess.run(
+        ["git", *arguments], cwd=root, capture_output=True, text=True, check=False
+    )
+    return done.stdout.strip() if done.returncode == 0 else ""
+
+
+def changed_since(root: Path, commit: str, measures: Sequence[str]) -> list[str]:
+    """Return the files below ``measures`` that differ between a commit and the files as they are, tests excepted."""
+    names = git(root, "diff", "--name-only", commit, "--", *measures).splitlines()
+    return [
+        name for name in names if name.endswith((".py", ".yaml", ".xml")) and "/tests/" not in name
+    ]
+
+
+def data_files(root: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the name and content of every data file."""
+    for path in sorted((root / DATA).glob("*.json")):
+        yield path.stem, json.loads(path.read_text(encoding="utf-8"))
+
+
+def stale(root: Path) -> dict[str, list[str]]:
+    """Return the files that have changed since, by data file; those with none are left out."""
+    found = {
+        name: changed_since(root, data["commit"], data["measures"])
+        for name, data in data_files(root)
+    }
+    return {name: changed for name, changed in found.items() if changed}
+
+
+def stale_line(commit: str, changed: Sequence[str]) -> str:
+    """Return the line below a table that is stale."""
+    shown = ", ".join(f"`{name}`" for name in changed[:3])
+    more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
+    return f"*Stale: since commit {commit[:8]}, with which this was measured, {shown}{more} changed.*\n"
+
+
+def write_tables(root: Path) -> None:
+    """Write the tables of all data files into their pages, with a line below those that are stale."""
+    behind = stale(root)
+    for name, data in data_files(root):
+        inside = table_of(data) if "rows" in data else ""
+        if name in behind:
+            inside += "\n" + stale_line(data["commit"], behind[name])
+        for page in data["pages"]:
+            path = root / page
+            text = replaced(path.read_text(encoding="utf-8"), name, inside)
+            path.write_text(text, encoding="utf-8")
+
+
+def keep(root: Path, folders: Sequence[Path], commit: str) -> Path:
+    """Write the data file of a study's results. Of several folders the first has all cells, and later ones replace those
+    that they made with more seeds."""
+    summaries = [
+        json.loads((folder / "summary.json").read_text(encoding="utf-8")) for folder in folders
+    ]
+    name = summaries[0]["study"]
+    labels = labels_of(folders[0])
+    rows: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for folder in folders:
+        for row in rows_of(folder, labels):
+            key = tuple(row[label] for label in labels)
+            if key not in rows or row["n"] > rows[key]["n"]:
+                rows[key] = row
+    data = {
+        "study": f"graphs/studies/{name}.yaml",
+        "commit": commit,
+        "measures": [*CONTROLLER, f"graphs/studies/{name}.yaml"],
+        "pages": list(PAGES[name]),
+        "seeds": max((summary["seeds"] for summary in summaries), key=len),
+        "labels": labels,
+        "rows": list(rows.values()),
+    }
+    path = root / DATA / f"{name}.json"
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    return path
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run the command line."""
+    verb, *rest = arguments or ("",)
+    if verb == "keep":
+        commit = git(ROOT, "rev-parse", "HEAD")
+        if rest[:1] == ["--commit"]:
+            commit, rest = rest[1], rest[2:]
+        print(keep(ROOT, [Path(folder) for folder in rest], commit))
+    elif verb == "stale":
+        behind = stale(ROOT)
+        for name, changed in behind.items():
+            print(f"{name}: {', '.join(changed)}")
+        return 1 if behind else 0
+    elif verb != "mark":
+        print(__doc__)
+        return 2
+    write_tables(ROOT)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

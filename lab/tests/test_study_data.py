@@ -1,0 +1,137 @@
+"""The data files of studies: pages' tables are made of them, and what has changed since is named."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+
+ROOT = Path(__file__).parents[2]
+FILES = sorted((ROOT / "docs" / "data").glob("*.json"))
+
+
+@pytest.fixture(scope="module")
+def script(docs_script: Callable[[str], ModuleType]) -> ModuleType:
+    return docs_script("study_data")
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_every_number_of_a_table_is_its_data_files(script: ModuleType, file: Path) -> None:
+    data = json.loads(file.read_text())
+    assert len(data["commit"]) == 40 and set(data["commit"]) <= set("0123456789abcdef")
+    assert (ROOT / data["study"]).is_file()
+    for page in data["pages"]:
+        text = (ROOT / page).read_text()
+        assert text.count(f"<!-- data: {file.stem} -->") == 1
+        inside = script.between(text, file.stem)
+        table, _, rest = inside.partition("\n*Stale: ")
+        assert table == (script.table_of(data) if "rows" in data else ""), (
+            "run: python lab/pages/study_data.py mark"
+        )
+        assert not rest or f"since commit {data['commit'][:8]}" in rest
+
+
+def results(folder: Path, runs: list[dict[str, Any]]) -> Path:
+    folder.mkdir()
+    parquet.write_table(pa.Table.from_pylist(runs), folder / "runs.parquet")
+    cells = [{"task": task, "arm": "one"} for task in sorted({run["task"] for run in runs})]
+    summary = {"study": "paper_pushes", "seeds": [5, 6, 7], "rows": cells}
+    (folder / "summary.json").write_text(json.dumps(summary))
+    return folder
+
+
+def run(task: str, success: bool, tilt: float | None, reason: str) -> dict[str, Any]:
+    return {
+        "task": task, "arm": "one", "success": success, "final_tilt_deg": tilt, "reason": reason,
+    }  # fmt: skip
+
+
+def test_runs_that_stand_are_counted_beside_those_that_succeed(
+    script: ModuleType, tmp_path: Path
+) -> None:
+    folder = results(tmp_path / "found", [
+        run("+x", True, 0.4, "all criteria hold"),
+        run("+x", False, 0.9, "flight of 0.158 s is below 90% of the planned 0.200 s"),
+        run("+x", False, None, "fell at 1.998 s: tilt 69.7 deg"),
+        run("+y", False, 6.0, "turned 20.8 deg, not within 5.0 deg of 30.0 deg"),
+    ])  # fmt: skip
+    assert script.labels_of(folder) == ["task"]
+    ahead, aside = script.rows_of(folder, ["task"])
+    assert (ahead["n"], ahead["successes"], ahead["stands"]) == (3, 1, 2)
+    assert ahead["misses"] == {"flight too short": 1, "fell": 1}
+    assert (aside["stands"], aside["misses"]) == (0, {"turn": 1})
+    data = {"labels": ["task"], "rows": [ahead, aside], "seeds": [5, 6, 7], "commit": "0123456789"}
+    assert script.table_of(data).splitlines() == [
+        "| task | stands | succeeds | misses |",
+        "|---|---|---|---|",
+        "| +x | 2 of 3 | 1 of 3 | 1 fell, 1 flight too short |",
+        "| +y | 0 of 1 | 0 of 1 | 1 turn |",
+        "",
+        "Seeds 5 to 7 (a row has as many as it has runs, from the first), code of commit 01234567.",
+    ]
+
+
+def test_cells_with_more_seeds_take_the_place_of_those_with_fewer(
+    script: ModuleType, tmp_path: Path
+) -> None:
+    fall = run("+x", False, None, "fell at 1.998 s")
+    few = results(tmp_path / "few", [fall, run("+y", True, 0.1, "")])
+    more = results(tmp_path / "more", [run("+x", True, 0.1, "")] * 3)
+    (tmp_path / "docs" / "data").mkdir(parents=True)
+    data = json.loads(script.keep(tmp_path, [few, more], "0" * 40).read_text())
+    assert [(row["task"], row["n"], row["stands"]) for row in data["rows"]] == [
+        ("+x", 3, 3),
+        ("+y", 1, 1),
+    ]
+
+
+def git(root: Path, *arguments: str) -> str:
+    who = ["-c", "user.name=test", "-c", "user.email=test@example.org"]
+    done = subprocess.run(
+        ["git", *who, *arguments], cwd=root, check=True, capture_output=True, text=True
+    )
+    return done.stdout.strip()
+
+
+def test_a_table_is_stale_when_what_it_measures_has_changed(
+    script: ModuleType, tmp_path: Path
+) -> None:
+    for name in ("blocks/law.py", "blocks/tests/test_law.py", "docs/data/x.json", "docs/page.md"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("one\n")
+    (tmp_path / "docs" / "page.md").write_text("<!-- data: x -->\n<!-- end of data: x -->\n")
+    git(tmp_path, "init", "-q")
+    git(tmp_path, "add", "blocks")
+    git(tmp_path, "commit", "-qm", "one")
+    commit = git(tmp_path, "rev-parse", "HEAD")
+    rows = [{"task": "up", "n": 2, "successes": 1, "stands": 2, "misses": {}}]
+    data = {
+        "commit": commit, "measures": ["blocks"], "pages": ["docs/page.md"], "labels": ["task"],
+        "rows": rows, "seeds": [1, 2],
+    }  # fmt: skip
+    (tmp_path / "docs" / "data" / "x.json").write_text(json.dumps(data))
+    script.write_tables(tmp_path)
+    page = (tmp_path / "docs" / "page.md").read_text()
+    assert "| up | 2 of 2 | 1 of 2 | - |" in page and "Stale" not in page
+    (tmp_path / "blocks" / "tests" / "test_law.py").write_text("two\n")
+    assert script.stale(tmp_path) == {}, "tests measure nothing"
+    (tmp_path / "blocks" / "law.py").write_text("two\n")
+    assert script.stale(tmp_path) == {"x": ["blocks/law.py"]}
+    script.write_tables(tmp_path)
+    page = (tmp_path / "docs" / "page.md").read_text()
+    line = f"*Stale: since commit {commit[:8]}, with which this was measured, `blocks/law.py` changed.*"
+    assert line in page
+    git(tmp_path, "commit", "-qam", "two")
+    assert script.stale(tmp_path) == {"x": ["blocks/law.py"]}, "also when that is committed"
+
+
+def test_a_page_without_the_marks_is_named(script: ModuleType) -> None:
+    with pytest.raises(ValueError, match="there is no <!-- data: x --> with an <!-- end of data"):
+        script.replaced("no marks", "x", "")
