@@ -28,8 +28,8 @@ from numpy.typing import NDArray
 
 from ...processes.child import report_ready
 from ...runtime.running.failures import describe
-from ...runtime.running.memory import Snapshot
 from ...runtime.running.sink import Note
+from ...runtime.running.snapshot import Snapshot
 from ..file.format import Header
 from ..file.held_fields import split_bus
 from .output_file import OutputFile, cause_of, reserve_output, split_name
