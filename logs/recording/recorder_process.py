@@ -309,7 +309,7 @@ class RecorderProcess:
             (np.array([tick for tick, _ in kept], np.int64), np.array([row for _, row in kept]))
             for kept in self._held
         ]
-        self._write(lambda writer: writer.write_parts(ticks, rows, held))
+        self._write(lambda writer: writer.write_groups(ticks, rows, held))
         self._filled = self._fed_rows = self._held_bytes = 0
         self._held = [[] for _ in self._bus.held]
 

@@ -134,7 +134,7 @@ class RecordingWriter:
         The rows are copied; curves and the robot in 3D are drawn of several thousand at once.
         """
         if not self._bus.held or not len(ticks):
-            self.write_parts(ticks, rows, ())
+            self.write_groups(ticks, rows, ())
             return
         before = self._before if int(ticks[0]) == self._last + 1 else None
         kept = self._bus.changed(ticks, rows, before)
@@ -143,9 +143,9 @@ class RecordingWriter:
             (ticks[places], part.take(rows[places]))
             for places, part in zip(kept, self._bus.held, strict=True)
         ]
-        self.write_parts(ticks, self._bus.base.take(rows), held)
+        self.write_groups(ticks, self._bus.base.take(rows), held)
 
-    def write_parts(
+    def write_groups(
         self,
         ticks: NDArray[np.int64],
         rows: NDArray[np.uint8],
