@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..files.pip_line import pip_line
 from ..hal.simulated.scenes import flat
 from ..logs.file.reader import RecordedRun
 from ..logs.viewing.contacts import force_scale, thruster_forces
@@ -19,7 +20,7 @@ from ..logs.viewing.scene_ports import scene_ports
 from ..mathematics.arrays import Array
 from ..plotting import DPI, Panel, draw_panels, image, new_figure, style
 from ..robots.kinematics import link_poses
-from ..runtime.language.errors import AloftError, pip_line
+from ..runtime.language.errors import AloftError
 from .offscreen import Offscreen, Pixels, View
 
 if TYPE_CHECKING:

@@ -34,8 +34,9 @@ from typing import TYPE_CHECKING, Any
 
 from ..files.document import read_file
 from ..files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain, text_of
+from ..files.pip_line import pip_line
 from ..files.problems import Code, LoadError, Position, Problems
-from ..runtime.language.errors import AloftError, pip_line
+from ..runtime.language.errors import AloftError
 from ..runtime.loading.reading.written import unknown_key
 from .execution import Run
 from .expansion import Cell, Tuned, cells

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...files.pip_line import pip_line
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
-from ...runtime.language.errors import pip_line
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from .vectors import SourceParameters, UnitFromParameters

@@ -14,7 +14,7 @@ from ...runtime.language.parameters import Parameters, ScalarOrVector, parameter
 from ...runtime.language.quantities import InputQuantities, OutputQuantities, Quantity
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import read_unit
-from ...runtime.language.units import QUANTITY, parse_quantity
+from ...runtime.language.units import parse_quantity, unit_in
 
 
 class Vector(Signal):
@@ -178,8 +178,8 @@ class SourceParameters(InUnit):
 def _units_in(value: Any) -> list[str]:
     """Return the units of all texts such as ``3 m`` in a value."""
     if isinstance(value, str):
-        match = QUANTITY.match(value)
-        return [match["unit"]] if match is not None and match["unit"].strip() else []
+        unit = unit_in(value)
+        return [unit] if unit else []
     if isinstance(value, Sequence) and not isinstance(value, bytes):
         return [unit for item in value for unit in _units_in(item)]
     return []

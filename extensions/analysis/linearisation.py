@@ -23,12 +23,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...files.pip_line import pip_line
 from ...logs.file.format import RecordedField
 from ...logs.file.header import recorded_signals
 from ...mathematics.arrays import Array, Flags
 from ...runtime.background.background_block import BackgroundBlock
 from ...runtime.graph import Graph, load
-from ...runtime.language.errors import AloftError, pip_line
+from ...runtime.language.errors import AloftError
 from ...runtime.running.memory import Region
 from ...runtime.running.stepping import SteppedRun
 from .coordinates import (

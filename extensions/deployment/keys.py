@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from ...files.names import inside
-from ...runtime.language.errors import AloftError, pip_line
+from ...files.pip_line import pip_line
+from ...runtime.language.errors import AloftError
 from ...runtime.placement.placed import PlacedGraph
 from ...runtime.transports.tls import (
     AUTHORITY,

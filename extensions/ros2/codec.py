@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.language.errors import BlockError, pip_line
+from ...files.pip_line import pip_line
+from ...runtime.language.errors import BlockError
 from ...runtime.language.signals import Field, Signal
 from .headers import (
     FrameNames,

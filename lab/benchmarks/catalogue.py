@@ -35,6 +35,7 @@ from .mutated_robots import mutated_robots
 from .planner.online_plans import online_plans
 from .planner.planner import planner
 from .recorder import recorder
+from .robot_files import robot_files
 from .rows import Row
 from .scheduler import scheduler
 from .startup import startup
@@ -71,12 +72,13 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "go2_staircase": go2_staircase,
     "every_robot": every_robot,
     "mutated_robots": mutated_robots,
+    "robot_files": robot_files,
 }
 """All benchmarks by name; each returns its rows."""
 LONG = (
     "agreement", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
     "pushed_courses", "changed_targets", "hopping_on", "stones", "staircase", "go2_staircase", "every_robot",
-    "mutated_robots",
+    "mutated_robots", "robot_files",
 )  # fmt: skip
 """Names of the benchmarks that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {

@@ -38,6 +38,7 @@ from result_tables import (
     ratio_table,
     real_table,
     results_table,
+    robot_files_table,
     table,
     tasks_table,
     tick_tables,
@@ -273,6 +274,11 @@ def write_robots_results(file: Path) -> None:
     refresh(DOCS / "robots_results.md", "tasks", tasks_table(read_json(file)))
 
 
+def write_robot_files(file: Path) -> None:
+    """Write every robot file of dm_control, Gymnasium and example-robot-data, compared with other readings of it."""
+    refresh(DOCS / "robots.md", "robot files", robot_files_table(read_json(file)["rows"]))
+
+
 def write_every_robot(file: Path) -> None:
     """Write every URDF of example-robot-data, read and put on its feet."""
     refresh(DOCS / "robots_results.md", "every robot", every_robot_table(read_json(file)["rows"]))
@@ -374,6 +380,7 @@ PAGES = {
     ),
     "effects": Page(write_effects, f"{STUDIES}effects.yaml", "results/effects/summary.json"),
     "every_robot": Page(write_every_robot, "aloft bench every_robot --json > FILE", "FILE"),
+    "robot_files": Page(write_robot_files, "aloft bench robot_files --json > FILE", "FILE"),
     "mutated_robots": Page(
         write_mutated_robots, "aloft bench mutated_robots --json > FILE", "FILE"
     ),

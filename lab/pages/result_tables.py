@@ -276,6 +276,18 @@ def every_robot_table(rows: Sequence[Row]) -> str:
     )
 
 
+def robot_files_table(rows: Sequence[Row]) -> str:
+    """Format one row a file: its largest difference to MuJoCo's or Pinocchio's reading, and what becomes of it."""
+    return table(
+        ("file", "largest difference", "what becomes of it"),
+        (
+            (row["name"], "" if row["value"] is None else f"{row['value']:.0e}", row["note"])
+            for row in rows
+            if row["name"] not in ("files that differ", "kinds on purpose")
+        ),
+    )
+
+
 def mutated_robots_table(rows: Sequence[Row]) -> str:
     """Format one row a kind of mistake, with the outcomes of its cases in each format; none where a
     format has no such kind.

@@ -23,10 +23,11 @@ from typing import Any
 
 import numpy as np
 
+from ...files.pip_line import pip_line
 from ...robots.description import Hull, RobotDescription
 from ...robots.shapes import surface
 from ...robots.surfaces import quaternion_from_z, robot_surfaces
-from ...runtime.language.errors import AloftError, pip_line
+from ...runtime.language.errors import AloftError
 from ...runtime.language.extensions import is_provided, missing_extension, provided
 from ...runtime.language.importing import without_imports
 from ..file.format import RecordedField, RecordedRows, nanoseconds

@@ -170,12 +170,11 @@ def _one_way(model: Any, k: int) -> Iterator[str]:
     import mujoco
 
     force, control = force_range(model, k), control_range(model, k)
+    limits: tuple[float, float] | None = None  # a servo's control is where it goes
     if force is not None:
         limits = force
     elif int(model.actuator_biastype[k]) == int(mujoco.mjtBias.mjBIAS_NONE):
         limits = control
-    else:
-        limits = None  # a servo's control is where it goes
     if limits is not None and abs(limits[0] + limits[1]) > 1e-9 * max(map(abs, limits)):
         yield f"{limits[0]:g} to {limits[1]:g}"
 

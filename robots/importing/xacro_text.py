@@ -10,7 +10,7 @@ import contextlib
 import io
 from pathlib import Path
 
-from ...runtime.language.errors import pip_line
+from ...files.pip_line import pip_line
 from ..validation import DescriptionError, RobotError
 from .package_files import find_package
 

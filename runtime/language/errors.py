@@ -6,6 +6,8 @@ from enum import IntEnum
 from importlib.util import find_spec
 from typing import Any
 
+from ...files.pip_line import pip_line
+
 
 class ExitCode(IntEnum):
     """Exit code of the process."""
@@ -62,24 +64,6 @@ def need_extra(module: str, extra: str, what: str) -> None:
         found = True
     if not found:
         raise MissingExtraError(f"{what} needs the library {module}: {pip_line(extra)}")
-
-
-def pip_line(extra: str) -> str:
-    """Return the command that installs what an extra of aloft's brings.
-
-    It names the libraries themselves, so that it is right wherever aloft was installed from.
-    """
-    import re
-    from importlib import metadata
-
-    try:
-        declared = metadata.requires("aloft-robotics") or []
-    except metadata.PackageNotFoundError:  # a folder on the path that was never installed
-        declared = []
-    mark = re.compile(rf"""extra\s*==\s*['"]{re.escape(extra)}['"]""")
-    wanted = [each.partition(";")[0].strip() for each in declared if mark.search(each)]
-    names = " ".join(f"'{each}'" for each in wanted)
-    return f"pip install {names}" if names else f"pip install -e '.[{extra}]' where aloft lies"
 
 
 class RunError(AloftError):

@@ -144,7 +144,7 @@ def _value_text(value: Any) -> str:
         return str(value).lower()
     if value is None:
         return "none"
-    return str(value)
+    return str(value) if value != "" else "''"
 
 
 def _bounds(info: FieldInfo) -> str:

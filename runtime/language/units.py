@@ -21,11 +21,16 @@ BASE_UNITS = ("m", "kg", "s", "A", "K", "mol", "cd", "rad")
 
 @dataclass(frozen=True)
 class Unit:
-    """A physical unit: ``scale`` times the product of the base units to their ``exponents``."""
+    """A physical unit: ``scale`` times the product of the base units to their ``exponents``.
+
+    ``offset`` is where its zero lies in base units. Only units from outside have one, as degrees Celsius of
+    an FMU.
+    """
 
     exponents: tuple[int, ...]
     scale: float
     text: str
+    offset: float = 0.0
 
     def __mul__(self, other: Unit) -> Unit:
         exponents = tuple(a + b for a, b in zip(self.exponents, other.exponents, strict=True))
@@ -42,15 +47,16 @@ class Unit:
 
     def matches(self, other: Unit) -> bool:
         """Return whether a value means the same in both units, with no conversion."""
-        return self.same_dimension(other) and math.isclose(self.scale, other.scale, rel_tol=1e-12)
+        same = math.isclose(self.scale, other.scale, rel_tol=1e-12) and self.offset == other.offset
+        return same and self.same_dimension(other)
 
     def factor_to(self, other: Unit) -> float:
         """Return the factor that converts a value in this unit to ``other``.
 
         Raises:
-            UnitError: the two have different dimensions.
+            UnitError: the two have different dimensions, or zeros.
         """
-        if not self.same_dimension(other):
+        if not self.same_dimension(other) or self.offset != other.offset:
             raise UnitError(f"cannot convert {self.text!r} to {other.text!r}")
         return self.scale / other.scale
 
@@ -71,6 +77,7 @@ _SYMBOLS: dict[str, Unit] = {
     **{name: _base(k) for k, name in enumerate(BASE_UNITS)},
     "1": _base(None),
     "g": _derived(1e-3, kg=1),
+    "um": _derived(1e-6, m=1),
     "mm": _derived(1e-3, m=1),
     "cm": _derived(1e-2, m=1),
     "km": _derived(1e3, m=1),
@@ -86,16 +93,51 @@ _SYMBOLS: dict[str, Unit] = {
     "dps": _derived(math.pi / 180, rad=1, s=-1),
     "Hz": _derived(s=-1),
     "kHz": _derived(1e3, s=-1),
+    "MHz": _derived(1e6, s=-1),
+    "mN": _derived(1e-3, kg=1, m=1, s=-2),
     "N": _derived(kg=1, m=1, s=-2),
     "kN": _derived(1e3, kg=1, m=1, s=-2),
+    "Nm": _derived(kg=1, m=2, s=-2),
+    "mJ": _derived(1e-3, kg=1, m=2, s=-2),
     "J": _derived(kg=1, m=2, s=-2),
+    "kJ": _derived(1e3, kg=1, m=2, s=-2),
+    "mW": _derived(1e-3, kg=1, m=2, s=-3),
     "W": _derived(kg=1, m=2, s=-3),
+    "kW": _derived(1e3, kg=1, m=2, s=-3),
     "Pa": _derived(kg=1, m=-1, s=-2),
+    "kPa": _derived(1e3, kg=1, m=-1, s=-2),
+    "MPa": _derived(1e6, kg=1, m=-1, s=-2),
+    "mbar": _derived(1e2, kg=1, m=-1, s=-2),
+    "bar": _derived(1e5, kg=1, m=-1, s=-2),
+    "uV": _derived(1e-6, kg=1, m=2, s=-3, A=-1),
+    "mV": _derived(1e-3, kg=1, m=2, s=-3, A=-1),
     "V": _derived(kg=1, m=2, s=-3, A=-1),
+    "kV": _derived(1e3, kg=1, m=2, s=-3, A=-1),
+    "uA": _derived(1e-6, A=1),
     "mA": _derived(1e-3, A=1),
+    "C": _derived(A=1, s=1),
+    "mohm": _derived(1e-3, kg=1, m=2, s=-3, A=-2),
     "ohm": _derived(kg=1, m=2, s=-3, A=-2),
+    "kohm": _derived(1e3, kg=1, m=2, s=-3, A=-2),
+    "uH": _derived(1e-6, kg=1, m=2, s=-2, A=-2),
+    "mH": _derived(1e-3, kg=1, m=2, s=-2, A=-2),
+    "H": _derived(kg=1, m=2, s=-2, A=-2),
+    "nF": _derived(1e-9, kg=-1, m=-2, s=4, A=2),
+    "uF": _derived(1e-6, kg=-1, m=-2, s=4, A=2),
+    "mF": _derived(1e-3, kg=-1, m=-2, s=4, A=2),
+    "F": _derived(kg=-1, m=-2, s=4, A=2),
+    "mT": _derived(1e-3, kg=1, s=-2, A=-1),
+    "T": _derived(kg=1, s=-2, A=-1),
+    "Wb": _derived(kg=1, m=2, s=-2, A=-1),
     "%": _derived(1e-2),
 }
+
+CELSIUS = "degC"
+"""Temperatures that are given so are converted to kelvin; it has an offset, so it is no unit."""
+ICE_POINT = 273.15
+"""0 degC in kelvin."""
+_MICRO = str.maketrans("\u00b5\u03bc", "uu")
+"""Both signs that are written for micro."""
 
 _TOKEN = re.compile(
     r"\s*(?:(?P<symbol>[A-Za-z%]+|1)(?:\s*(?:\^|\*\*)\s*(?P<power>[+-]?\d+))?|(?P<op>[*/·()]))"
@@ -118,7 +160,7 @@ def parse_unit(text: str) -> Unit:
     """
     tokens: list[tuple[str, int] | str] = []
     position = 0
-    stripped = text.strip()
+    stripped = text.strip().translate(_MICRO)
     while position < len(stripped):
         match = _TOKEN.match(stripped, position)
         if match is None or match.end() == position:
@@ -147,7 +189,7 @@ def symbol_powers(text: str) -> Mapping[str, int]:
     signs = [1]  # of the brackets that are open
     sign = 1
     position = 0
-    stripped = text.strip()
+    stripped = text.strip().translate(_MICRO)
     while position < len(stripped):
         match = _TOKEN.match(stripped, position)
         assert match is not None
@@ -192,7 +234,7 @@ def _product(
         else:
             symbol, power = token
             if symbol not in _SYMBOLS:
-                raise UnitError(f"cannot read unit {text!r}: unknown symbol {symbol!r}")
+                raise UnitError(_unknown(symbol, text))
             factor = _SYMBOLS[symbol] ** power
         result = result * factor**sign
         sign, pending = 1, False
@@ -201,8 +243,28 @@ def _product(
     return result, []
 
 
+def _unknown(symbol: str, text: str) -> str:
+    """Return what is wrong with a symbol that is none."""
+    if symbol == CELSIUS:
+        return (
+            f"{text!r} has an offset: a temperature may be given as 20 {CELSIUS}, and signals, differences "
+            "and products of it are in K"
+        )
+    return f"cannot read unit {text!r}: unknown symbol {symbol!r}; the symbols are " + ", ".join(
+        known_symbols()
+    )
+
+
+def unit_in(text: str) -> str:
+    """Return the unit that a text such as ``70 N`` is in: K for degrees Celsius, empty for a number
+    without one or a text that is no number."""
+    match = QUANTITY.match(text)
+    found = match["unit"].strip() if match is not None else ""
+    return "K" if found == CELSIUS else found
+
+
 def parse_quantity(text: str, unit: str) -> float:
-    """Return the value in ``unit`` of a text such as ``70 N``, ``10 ms`` or ``1/3 kHz``.
+    """Return the value in ``unit`` of a text such as ``70 N``, ``10 ms``, ``1/3 kHz`` or ``20 degC``.
 
     A number without a unit is taken as it is.
 
@@ -220,6 +282,8 @@ def parse_quantity(text: str, unit: str) -> float:
         number /= divisor
     if not match["unit"].strip():
         return number
+    if match["unit"].strip() == CELSIUS and parse_unit(unit).matches(_SYMBOLS["K"]):
+        return number + ICE_POINT
     found, expected = parse_unit(match["unit"]), parse_unit(unit)
     if not found.same_dimension(expected):
         raise UnitError(f"{text!r} is not in {expected}")
@@ -228,4 +292,4 @@ def parse_quantity(text: str, unit: str) -> float:
 
 def known_symbols() -> list[str]:
     """Every unit symbol that ``parse_unit`` knows, sorted."""
-    return sorted(_SYMBOLS)
+    return sorted(_SYMBOLS, key=lambda symbol: (symbol.lower(), symbol))

@@ -46,8 +46,9 @@ from threading import Thread
 from time import monotonic
 from typing import Any, Self
 
+from ...files.pip_line import pip_line
 from ...processes.child import end_with
-from ...runtime.language.errors import AloftError, pip_line
+from ...runtime.language.errors import AloftError
 
 
 @dataclass(frozen=True)

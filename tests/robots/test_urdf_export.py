@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
+import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -117,3 +120,78 @@ def test_hulls_become_meshes_beside_the_file(tmp_path: Path) -> None:
     (shape,) = find_robot("back.urdf", tmp_path).link("torso").shapes
     assert isinstance(shape, Hull)
     np.testing.assert_allclose(sorted(shape.corners), sorted(corners), atol=1e-4)
+
+
+def page_code(word: str) -> str:
+    """The code of the page on robots that imports a program."""
+    page = (Path(__file__).parents[2] / "docs" / "robots.md").read_text(encoding="utf-8")
+    (code,) = [
+        c
+        for c in re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+        if word in c and "bruce.urdf" in c
+    ]
+    return code
+
+
+def loaded(word: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What the page's code makes of BRUCE's URDF."""
+    (folder / "bruce.urdf").write_text(urdf_of(find_robot("bruce")))
+    monkeypatch.chdir(folder)
+    names: dict[str, Any] = {}
+    exec(page_code(word), names)  # noqa: S102  # what readers of the page run
+    return names
+
+
+def judge_mass(columns: Any, angles: Any) -> Any:
+    """Pinocchio's mass matrix of our model with the base at the origin, its joints in these columns."""
+    robot = find_robot("bruce")
+    ours = build_pinocchio_model(robot).model
+    ours.armature = np.zeros(ours.nv)
+    q = np.concatenate([np.zeros(6), [1.0], angles])
+    mass = pin.crba(ours, ours.createData(), q)
+    mass = np.triu(mass) + np.triu(mass, 1).T
+    order = np.argsort([columns[joint.name] for joint in robot.joints])
+    at = [*range(6), *(6 + order)]
+    return mass[np.ix_(at, at)]
+
+
+@pytest.mark.parametrize("word", ["import pinocchio", "import mujoco"])
+def test_other_programs_have_its_dynamics_as_the_page_loads_it(
+    word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, names = find_robot("bruce"), loaded(word, tmp_path, monkeypatch)
+    model, columns = names["model"], names["columns"]
+    assert {*columns} == {joint.name for joint in robot.joints} and model.nv == 16
+    angles = np.random.default_rng(5).normal(size=10)
+    if word == "import mujoco":
+        data = mujoco.MjData(model)
+        for joint, angle in zip(robot.joints, angles, strict=True):
+            data.qpos[model.joint(joint.name).qposadr[0]] = angle
+        data.qpos[:7] = [0, 0, 0, 1, 0, 0, 0]
+        mujoco.mj_forward(model, data)
+        mass = np.zeros((16, 16))
+        mujoco.mj_fullM(model, data, mass)
+    else:
+        q = pin.neutral(model)
+        for joint, angle in zip(robot.joints, angles, strict=True):
+            q[model.joints[model.getJointId(joint.name)].idx_q] = angle
+        mass = pin.crba(model, model.createData(), q)
+        mass = np.triu(mass) + np.triu(mass, 1).T
+    np.testing.assert_allclose(mass, judge_mass(columns, angles), rtol=0, atol=1e-9)
+
+
+def test_drake_has_its_dynamics_as_the_page_loads_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("pydrake")
+    robot, names = find_robot("bruce"), loaded("from pydrake", tmp_path, monkeypatch)
+    plant, columns = names["plant"], names["columns"]
+    assert {*columns} == {joint.name for joint in robot.joints}
+    angles = np.random.default_rng(5).normal(size=10)
+    context = plant.CreateDefaultContext()
+    for joint, angle in zip(robot.joints, angles, strict=True):
+        plant.GetJointByName(joint.name).set_angle(context, angle)
+    theirs = plant.CalcMassMatrix(context)
+    ours = judge_mass(columns, angles)
+    swap = [3, 4, 5, 0, 1, 2, *range(6, 16)]  # Drake has turning before moving
+    np.testing.assert_allclose(theirs, ours[np.ix_(swap, swap)], rtol=0, atol=1e-9)

@@ -20,11 +20,12 @@ from typing import Any
 
 import numpy as np
 
+from ....files.pip_line import pip_line
 from ....files.problems import LoadError, Position, listing, nearest
 from ....files.validation import unit_of
 from ....mathematics.arrays import Array
 from ....plotting import COLOURS, FAINT, image, new_figure, style, svg_text
-from ....runtime.language.errors import AloftError, pip_line
+from ....runtime.language.errors import AloftError
 from ....runtime.language.parameters import given_values
 from ....studies.execution import Run
 from ....studies.expansion import Cell, load_cell

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from ....files.names import is_file_name
+from ....files.pip_line import pip_line
 from ....runtime.language.block import Block
-from ....runtime.language.errors import BlockError, UnitError, pip_line
+from ....runtime.language.errors import BlockError, UnitError
 from ....runtime.language.signals import Field, Signal
 from ....runtime.language.units import BASE_UNITS, Unit, parse_unit
 
@@ -273,16 +274,15 @@ def _start(text: Any, kind: str, size: int) -> tuple[float, ...]:
 
 
 def _unit(name: str, base: Any) -> Unit | None:
-    """Return a unit of FMI; ``None`` where it has an offset, such as degrees Celsius, or cannot be read."""
+    """Return a unit of FMI; ``None`` where it cannot be read. Degrees Celsius have an offset."""
     if base is None:
         try:
             return parse_unit(name.replace(".", " "))
         except UnitError:
             return None
-    if float(base.offset or 0.0) != 0.0:
-        return None
+    offset = float(base.offset or 0.0)
     exponents = tuple(int(getattr(base, symbol) or 0) for symbol in BASE_UNITS)
-    return Unit(exponents, float(base.factor or 1.0), name if any(exponents) else "")
+    return Unit(exponents, float(base.factor or 1.0), name if any(exponents) else "", offset)
 
 
 def _name(text: str) -> str:

@@ -6,7 +6,8 @@ import tempfile
 from functools import lru_cache
 from pathlib import Path
 
-from ....runtime.language.errors import BlockError, pip_line
+from ....files.pip_line import pip_line
+from ....runtime.language.errors import BlockError
 
 SLAVE = '''\
 from pythonfmu3 import Fmi3Causality, Fmi3Slave, Fmi3Status, Fmi3Variability, Float64, Unit

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+from ....files.pip_line import pip_line
 from ....runtime.language.block import Block, Context, Metric, Output, UnmetRequirement
-from ....runtime.language.errors import pip_line
 from ....runtime.language.parameters import Parameters, parameter
 from ..signals import BodyTwist
 

@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Any
 from ....cli.shared.output import errors_reported
 from ....files.document import read_value
 from ....files.nodes import ListNode, MapNode, Node
+from ....files.pip_line import pip_line
 from ....files.problems import LoadError, Position, Problem, Problems
 from ....runtime.language.block import Block
-from ....runtime.language.errors import AloftError, pip_line
+from ....runtime.language.errors import AloftError
 from ....runtime.language.importing import NOT_IMPORTED, find_source, without_imports
 from ....runtime.loading.reading.files import PREFIX, graph_path
 

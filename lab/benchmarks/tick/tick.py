@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 
 from ....blocks.control.dynamics import Dynamics
 from ....blocks.control.whole_body_controller import WholeBodyController
-from ....runtime.language.errors import AloftError, pip_line
+from ....files.pip_line import pip_line
+from ....runtime.language.errors import AloftError
 from ..full_program import FullMatrices
 from ..rows import Row
 from ..startup import time_process

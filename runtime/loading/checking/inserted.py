@@ -24,7 +24,7 @@ from ...language.quantities import UNCHECKED, InputQuantities, OutputQuantities,
 from ...language.signals import Field, Signal
 from ...language.stages import BlockSpec, Wire
 from ...language.unit_algebra import ONE
-from ...language.units import QUANTITY, Unit, parse_quantity, parse_unit
+from ...language.units import QUANTITY, Unit, parse_quantity, parse_unit, unit_in
 from .block_check import BlockDraft
 
 
@@ -259,13 +259,11 @@ def own_unit(node: Node) -> Unit | None:
     means the same in all of them.
     """
     if isinstance(node, ScalarNode):
-        if isinstance(node.value, str):
-            match = QUANTITY.match(node.value)
-            if match is not None:
-                try:
-                    return parse_unit(match["unit"])
-                except UnitError:
-                    return ONE  # reported with the value
+        if isinstance(node.value, str) and QUANTITY.match(node.value) is not None:
+            try:
+                return parse_unit(unit_in(node.value))
+            except UnitError:
+                return ONE  # reported with the value
         return None if node.value in (0, False) else ONE
     found = [own_unit(item) for item in (node.items if isinstance(node, ListNode) else ())]
     units = [unit for unit in found if unit is not None]

@@ -339,9 +339,9 @@ def compare(
 
 
 def _says_unit(source: BlockDraft) -> bool:
-    """Return whether the source is a block whose parameter ``unit`` may still be set."""
-    fields = type(source.params).model_fields if source.params is not None else {}
-    return "unit" in fields and source.flat.parameters.get("unit") is None
+    """Return whether the source is a block whose parameter ``unit`` may still be set: neither it nor a
+    number such as ``3 A`` says it."""
+    return getattr(source.params, "unit", None) == "" and source.flat.parameters.get("unit") is None
 
 
 def _compare_units(
@@ -349,7 +349,13 @@ def _compare_units(
 ) -> Iterator[Mismatch]:
     if given is None or wanted.unit is None or given.matches(wanted.unit):
         return
-    if given.same_dimension(wanted.unit):
+    if given.offset != wanted.unit.offset:
+        zeros = (f"{unit}, whose zero is {unit.offset:g}" for unit in (wanted.unit, given))
+        yield Mismatch(
+            Code.UNIT, f"field {name!r} has another zero", *zeros,
+            "convert it in a block between: blocks.Expression, such as u + 273.15",
+        )  # fmt: skip
+    elif given.same_dimension(wanted.unit):
         factor = given.factor_to(wanted.unit)
         yield Mismatch(
             Code.UNIT,

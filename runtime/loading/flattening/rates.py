@@ -25,6 +25,7 @@ def read_period(flat: FlatBlock, base_rate: float, problems: Problems) -> int:
     if period >= 1 and abs(ratio - period) <= 1e-9 * period:
         return period
     periods = [1] if ratio < 1 else [int(ratio), int(ratio) + 1]
+    periods.sort(key=lambda period: abs(base_rate / period - rate))
     legal = tuple(_rate_text(base_rate, p) for p in periods)
     problems.add(
         Code.RATE,

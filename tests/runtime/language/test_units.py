@@ -1,6 +1,9 @@
 """Units: parsing, algebra and conversion."""
 
 import math
+import re
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -69,6 +72,18 @@ def test_a_slash_divides_by_one_factor_only() -> None:
         (".5 kN", "N", 500.0),
         ("5 %", "", 0.05),
         ("9 g", "kg", 0.009),
+        ("20 degC", "K", 293.15),
+        ("12 mV", "V", 0.012),
+        ("3 mN m", "Nm", 0.003),
+        ("2 kPa", "N/m^2", 2000.0),
+        ("1.5 bar", "Pa", 1.5e5),
+        ("4 \u00b5m", "m", 4e-6),
+        ("8 MHz", "Hz", 8e6),
+        ("3 mH", "V s/A", 3e-3),
+        ("47 uF", "A s/V", 47e-6),
+        ("2 T", "N/A/m", 2.0),
+        ("250 mW", "V A", 0.25),
+        ("1 kV", "J/C", 1000.0),
     ],
 )
 def test_quantity(text: str, unit: str, value: float) -> None:
@@ -78,7 +93,17 @@ def test_quantity(text: str, unit: str, value: float) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("N q", "cannot read unit 'N q': unknown symbol 'q'"),
+        (
+            "N q",
+            f"cannot read unit 'N q': unknown symbol 'q'; the symbols are {', '.join(SYMBOLS)}",
+        ),
+        (
+            "W/degC",
+            (
+                "'W/degC' has an offset: a temperature may be given as 20 degC, and signals, "
+                "differences and products of it are in K"
+            ),
+        ),
         ("N^^2", "cannot read unit 'N^^2' at '^^2'"),
         ("m/", "cannot read unit 'm/': nothing behind an operator"),
         ("m*/s", "cannot read unit 'm*/s': two operators in a row"),
@@ -98,6 +123,14 @@ def test_errors_of_units(text: str, message: str) -> None:
     [
         ("fast", "m/s", "cannot read 'fast' as a number with a unit"),
         ("70 N", "m", "'70 N' is not in m"),
+        (
+            "20 degC",
+            "m",
+            (
+                "'degC' has an offset: a temperature may be given as 20 degC, and signals, "
+                "differences and products of it are in K"
+            ),
+        ),
     ],
 )
 def test_errors_of_quantities(text: str, unit: str, message: str) -> None:
@@ -140,3 +173,19 @@ def test_fractions_and_hours() -> None:
     assert parse_quantity("1 /s", "Hz") == 1.0
     with pytest.raises(UnitError, match="divides by zero"):
         parse_quantity("1/0 kHz", "Hz")
+
+
+def test_the_page_lists_all_symbols() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "graph_files.md").read_text()
+    section = page.partition("### Symbols of units")[2].partition("\n\nA parameter")[0]
+    table = section.partition("|---|---|")[2]
+    listed = [text for text in re.findall(r"`([^`]+)`", table) if " " not in text]
+    assert sorted(listed) == sorted(SYMBOLS)
+
+
+def test_units_with_other_zeros_do_not_match() -> None:
+    kelvin = parse_unit("K")
+    celsius = replace(kelvin, text="degC", offset=273.15)
+    assert not celsius.matches(kelvin) and celsius.matches(celsius)
+    with pytest.raises(UnitError, match="cannot convert 'degC' to 'K'"):
+        celsius.factor_to(kelvin)

@@ -258,8 +258,8 @@ def test_the_fix_of_a_rate_is_a_fraction_where_decimals_are_endless() -> None:
     with pytest.raises(LoadError) as caught:
         graph_of(block.format("34 Hz"))
     (problem,) = caught.value.report.problems
-    assert problem.fix == "rate: 50 Hz"
-    assert problem.nearest == ("50 Hz", "100/3 Hz")
+    assert problem.fix == "rate: 100/3 Hz"
+    assert problem.nearest == ("100/3 Hz", "50 Hz"), "the nearest comes first"
     assert graph_of(block.format("100/3 Hz")).blocks[0].period_ticks == 3
 
 

@@ -7,7 +7,7 @@ import pytest
 from aloft.files.problems import Problem
 from aloft.runtime.language.block import Block
 from aloft.runtime.language.registry import all_blocks
-from aloft.runtime.loading import check, checked_file, checked_text
+from aloft.runtime.loading import LoadError, check, checked_file, checked_text
 
 SENSOR = """\
 from aloft import Block, Field, Input, Output, Parameters, Signal, parameter
@@ -239,3 +239,21 @@ def test_every_shipped_block_says_what_it_carries() -> None:
     for name, block in all_blocks().items():
         carries = any(f.inferred for o in block.outputs.values() for f in o.signal.fields.values())
         assert not carries or block.infer_units.__func__ is not Block.infer_units.__func__, name
+
+
+@pytest.mark.parametrize(
+    ("value", "found", "fix"),
+    [("3 A", "A", ""), ("20 degC", "K", ""), ("3", "1", "say what its numbers are")],
+)
+def test_a_source_that_says_its_unit_is_not_asked_for_it(value: str, found: str, fix: str) -> None:
+    text = f"""
+rate: 100 Hz
+blocks:
+  c: {{use: blocks.Constant, with: {{value: [{value}, 0, 0]}}}}
+  e: {{use: blocks.EulerToQuaternion, in: {{u: c.y}}}}
+"""
+    with pytest.raises(LoadError) as caught:
+        checked_text(text, Path("graph.yaml"))
+    (problem,) = caught.value.report.problems
+    assert (problem.expected, problem.found) == ("rad", found)
+    assert problem.fix.startswith(fix) if fix else "say what" not in problem.fix

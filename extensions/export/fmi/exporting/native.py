@@ -15,7 +15,8 @@ from hashlib import sha256
 from math import prod
 from pathlib import Path
 
-from .....runtime.language.errors import AloftError, pip_line
+from .....files.pip_line import pip_line
+from .....runtime.language.errors import AloftError
 from ...clib.cut import start_of
 from ...clib.module import STATUS_TEXTS
 from ...clib.targets import TARGETS, assembler

@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from ..... import __version__
+from .....files.pip_line import pip_line
 from .....logs.file.dependencies import named_file
 from .....runtime.bundle import copy_module, with_robot_beside
-from .....runtime.language.errors import AloftError, pip_line
+from .....runtime.language.errors import AloftError
 from ...clib.cut import Cut, Terminal, cut, start_of
 from ...clib.part import NeedsPython
 from ...clib.write import prepare

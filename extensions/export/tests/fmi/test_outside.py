@@ -1,10 +1,13 @@
 """``export.Outside``: outputs that somebody sets, their types, and wrong declarations."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from aloft.extensions.export.fmi.description import _unit
 from aloft.extensions.export.fmi.outside import Outside
+from aloft.runtime.language.units import BASE_UNITS, parse_unit
 from aloft.runtime.loading import LoadError, checked_text
 from aloft.runtime.testing import BlockBench
 
@@ -37,3 +40,11 @@ def test_wrong_fields_are_reported(field: dict[str, Any], message: str) -> None:
     text = f"rate: 100 Hz\nblocks:\n  a: {{use: export.Outside, with: {{ports: {{y: {{value: {field}}}}}}}}}\n"
     with pytest.raises(LoadError, match=message):
         checked_text(text, "graph.yaml")
+
+
+def test_degrees_celsius_of_an_fmu_are_no_kelvin() -> None:
+    powers = dict.fromkeys(BASE_UNITS, 0) | {"K": 1}
+    celsius = _unit("degC", SimpleNamespace(factor=1.0, offset=273.15, **powers))
+    kelvin = _unit("K", SimpleNamespace(factor=1.0, offset=0.0, **powers))
+    assert celsius is not None and kelvin is not None
+    assert kelvin.matches(parse_unit("K")) and not celsius.matches(kelvin)

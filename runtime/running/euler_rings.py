@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..language.errors import AloftError
 from ..language.kernel_block import KernelBlock
 from ..language.stages import BlockSpec, CheckedGraph
-from ..running.memory import BoundGraph
+from .memory import BoundGraph
 
 INTEGRATOR = "Integrator"
 """The class of ``blocks.general`` that integrates by forward Euler."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aloft import load
-from aloft.runtime.loading.euler_rings import growing_rings
+from aloft.runtime.running.euler_rings import growing_rings
 
 SPRING = """
 rate: {rate} Hz
