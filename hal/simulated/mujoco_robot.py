@@ -143,7 +143,8 @@ class MujocoRobot(SimulatedRobot):
             )
         elif params.actuators.bus_period is not None:
             yield from gain_requirements(params, robot)
-        uneven = uneven_contacts(robot) if robot.base_joint != "fixed" else ""
+        stands = robot.base_joint != "fixed" and params.start.stand
+        uneven = uneven_contacts(robot) if stands else ""
         if uneven:
             yield UnmetRequirement(
                 uneven,
