@@ -49,6 +49,9 @@ def check(
         from ..runtime.transports.registry import open_endpoints
 
         warnings = open_endpoints(checked.machines)
+    from ..runtime.running.block_mistakes import tied_to_machine
+
+    warnings += tied_to_machine(checked)
     if sum(spec.block_type.__name__ == "Integrator" for spec in checked.blocks) > 1:
         from ..runtime.running.euler_rings import growing_rings
 
