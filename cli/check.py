@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .shared.options import AsJson, CompletedOverrides
 from .shared.output import console, errors_reported, print_json, say, table
+
+if TYPE_CHECKING:
+    from ..runtime.language.stages import CheckedGraph
+
+
+OWN = f"{__package__.partition('.')[0]}."
+"""The start of the names of aloft's own modules."""
 
 
 def check(
@@ -35,16 +42,16 @@ def check(
         raise typer.BadParameter("a graph file is needed, or --schema")
     with errors_reported(as_json):
         checked = checked_file(graph, overrides or [])
-        from ..runtime.running.block_mistakes import mistakes_of
-        from ..runtime.running.kernel_checks import KernelMistake
-
-        if mistakes := mistakes_of(checked):
-            raise KernelMistake("\n".join(mistakes.values()), block=next(iter(mistakes)))
+        if any(not spec.block_type.__module__.startswith(OWN) for spec in checked.blocks):
+            check_users_blocks(checked)
     warnings: list[str] = []
     if checked.machines:
         from ..runtime.transports.registry import open_endpoints
 
         warnings = open_endpoints(checked.machines)
+    from ..runtime.running.block_mistakes import tied_to_machine
+
+    warnings += tied_to_machine(checked)
     if sum(spec.block_type.__name__ == "Integrator" for spec in checked.blocks) > 1:
         from ..runtime.running.euler_rings import growing_rings
 
@@ -67,6 +74,19 @@ def check(
         count, machines = len(checked.blocks), len(checked.machines)
         spread = f" on {machines} machine{'s' if machines > 1 else ''}" if machines else ""
         typer.echo(f"{graph}: no problems; {count} blocks at {checked.base_rate:g} Hz{spread}")
+
+
+def check_users_blocks(graph: CheckedGraph) -> None:
+    """Set up the users' blocks of a graph alone, which finds mistakes in their kernels and in ``setup``.
+
+    Raises:
+        KernelMistake: a block has one.
+    """
+    from ..runtime.running.block_mistakes import mistakes_of
+    from ..runtime.running.kernel_checks import KernelMistake
+
+    if mistakes := mistakes_of(graph):
+        raise KernelMistake("\n".join(mistakes.values()), block=next(iter(mistakes)))
 
 
 def doctor(

@@ -70,7 +70,7 @@ def replay(
     as_json: JsonBesideTables = False,
     quiet: Quiet = False,
 ) -> None:
-    """Execute a recorded run again and compare every byte of every tick with the recording."""
+    """Re-run a recording and check that it is bit-identical."""
     out = console(to_stderr=as_json, quiet=quiet)
     with errors_reported(as_json):
         opened = opened_recording(recording, folder, trust=trust)

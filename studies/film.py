@@ -20,6 +20,7 @@ from ..logs.viewing.scene_ports import scene_ports
 from ..mathematics.arrays import Array
 from ..plotting import DPI, Panel, draw_panels, image, new_figure, style
 from ..robots.kinematics import link_poses
+from ..robots.robot_description import Appearance, RobotDescription
 from ..runtime.language.errors import AloftError
 from .offscreen import Offscreen, Pixels, View
 
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 ENDINGS = (".gif", ".mp4", ".png")
-FRAMING = 2.4
-"""The camera's distance, in sizes of the robot: the largest extent of its links' origins at the start."""
+FRAMING = 1.7
+"""The camera's distance, in sizes of the robot: the largest extent of its shapes at the start."""
 FOLLOW_WINDOW = 0.5
 """The seconds over which the place of a base is averaged that the camera follows."""
 COLORS = 128
@@ -73,7 +74,7 @@ class Plots:
             draw_panels(list(zip(axes, panels, strict=True)))
             self._image = image(figure)
         self._areas = [
-            (each.get_window_extent(), each.get_xlim()) for each in axes
+            (each.get_windowextent(), each.get_xlim()) for each in axes
         ]  # in pixels from below, and the times of its sides
 
     def picture(self, instant: float) -> Pixels:
@@ -132,10 +133,11 @@ class Take:
         self._middle = _smoothed(self.base, self.time) if camera.follow else None
         low, high = self.base.min(axis=0), self.base.max(axis=0)
         travel = (high - low)[2:] if camera.follow else high - low
-        links = link_poses(robot, self.base[:1], self.turn[:1], self.joints[:1]).position[0]
-        size = max(standing, float(np.ptp(links, axis=0).max()))
+        bottom, top = extent(robot, self.base[:1], self.turn[:1], self.joints[:1])
+        size = max(standing, float((top - bottom).max()))
         self._center = 0.5 * (low + high)
-        self._center[2] -= 0.3 * standing
+        # Between the lowest and the highest that is seen, head and soles included.
+        self._center[2] += 0.5 * float(bottom[2] + top[2]) - float(self.base[0, 2])
         self._distance = camera.distance or FRAMING * size + float(np.linalg.norm(travel))
 
     def row(self, instant: float) -> int:
@@ -163,6 +165,24 @@ class Take:
         """Return the caption below the picture."""
         phase = "" if self._phases is None else f"  {self._phases[row]}"
         return f"{self.caption}  {self.time[row]:.2f} s{phase}"
+
+
+def extent(robot: RobotDescription, base: Array, turn: Array, joints: Array) -> tuple[Array, Array]:
+    """Return the least and the greatest coordinates of a robot's links and their shapes [m]."""
+    poses = link_poses(robot, base, turn, joints)
+    low, high = poses.position[0].min(axis=0), poses.position[0].max(axis=0)
+    for number, link in enumerate(robot.links):
+        look = robot.looks.get(link.name, Appearance())
+        balls = [
+            (corner, shape.radius)
+            for shape in (*link.shapes, *look.shapes)
+            for corner in shape.corners
+        ]
+        balls += [(box.position, 0.5 * max(box.size)) for box in look.boxes]
+        for point, radius in balls:
+            place = poses.position[0, number] + poses.rotation[0, number] @ np.asarray(point)
+            low, high = np.minimum(low, place - radius), np.maximum(high, place + radius)
+    return low, high
 
 
 def _named_phase(run: RecordedRun) -> list[str] | None:

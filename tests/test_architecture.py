@@ -75,12 +75,13 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "planner/drawing": (
         "planner/task", "planner/models", "planner/checking", "planner/library", "mathematics/arrays", "robots",
     ),
-    "blocks/general": ("blocks/signals", "mathematics", "robots", "runtime/language"),
+    "blocks/general": ("blocks/signals", "files/pip_line", "mathematics", "robots", "runtime/language"),
     "blocks/estimation": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "blocks/control": ("files", "blocks/signals", "mathematics", "robots", "runtime/language"),
     "blocks/jumping": ("blocks/signals", "mathematics", "robots", "runtime/language", "planner"),
     "blocks/scoring": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "hal": ("processes", "files", "blocks/signals", "mathematics", "robots", "runtime/language"),
+    "hal/log": ("hal", "files", "blocks/signals", "mathematics", "robots", "runtime/language", "logs/file"),
     "logs/file": ("files", "robots", "runtime/language", "runtime/running"),
     "logs/viewing": ("files", "logs/file", "hal/sensors", "mathematics", "robots", "runtime/language"),
     "logs/recording": (
@@ -89,6 +90,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     ),
     "logs/replay": ("files", "blocks/signals", "logs/file", "logs/viewing", "robots", "runtime"),
     "logs/exporting": (
+        "files/pip_line",
         "logs/file", "hal/sensors", "logs/viewing", "mathematics", "robots", "runtime/language",
     ),
     "logs": ("logs/file",),

@@ -187,3 +187,23 @@ def test_notice_names_every_robot_whose_file_is_from_elsewhere() -> None:
     notice = (ROOT / "NOTICE").read_text()
     for path in sorted((ROOT / "robots").glob("*/*.yaml")):
         assert path.stem in notice, path.stem
+
+
+def test_the_root_hides_no_package_that_people_import_beside_aloft() -> None:
+    """The root is the package, so Python in it finds our files first."""
+    ours = {path.stem for path in ROOT.glob("*.py")} | {
+        path.parent.name for path in ROOT.glob("*/__init__.py")
+    }
+    brought = {
+        "gym",
+        "gymnasium",
+        "numpy",
+        "mujoco",
+        "pinocchio",
+        "rerun",
+        "control",
+        "optuna",
+        "mcap",
+        "zenoh",
+    }
+    assert not ours & brought

@@ -181,6 +181,56 @@ def test_a_page_leads_to_other_versions(built_site: Path, tmp_path: Path, page: 
         server.shutdown()
 
 
+WIDTHS = (390, 1024, 1320, 1400)
+"""Widths of a telephone and of the commonest screens [px]."""
+SHOWN = ("index", "tutorial", "gallery", "results", "frameworks", "install", "known_gaps")
+
+
+@pytest.mark.long
+@pytest.mark.skipif(PROGRAM is None, reason="looks in a real browser; install Debian's chromium")
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_no_page_scrolls_sideways_or_cuts_its_text(
+    built_site: Path, tmp_path: Path, theme: str
+) -> None:
+    handler = partial(SimpleHTTPRequestHandler, directory=str(built_site.parent))
+    wrong = []
+    with (
+        ThreadingHTTPServer(("127.0.0.1", 0), handler) as server,
+        Browser(tmp_path, (1400, 900)) as browser,
+    ):
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        # The page's own choice, which the theme keeps: dark text must not be laid out otherwise.
+        for name in SHOWN:
+            browser.open(
+                f"http://127.0.0.1:{server.server_port}/{aloft.__version__}/docs/{name}.html"
+            )
+            browser.ask("Runtime.evaluate", expression=f"document.body.dataset.theme = {theme!r}")
+            for width in WIDTHS:
+                browser.ask(
+                    "Emulation.setDeviceMetricsOverride",
+                    width=width, height=900, deviceScaleFactor=1, mobile=False,
+                )  # fmt: skip
+                found = browser.ask("Runtime.evaluate", expression=SIDEWAYS, returnByValue=True)
+                wrong += [f"{name} at {width} px: {each}" for each in found["result"]["value"]]
+        server.shutdown()
+    assert not wrong
+
+
+SIDEWAYS = """(() => {
+  const found = [], page = document.documentElement;
+  if (page.scrollWidth > page.clientWidth) found.push("scrolls to " + page.scrollWidth + " px");
+  for (const each of document.querySelectorAll(".content h1, .content h2, .content p, .toc-drawer a")) {
+    const box = each.getBoundingClientRect(), shown = getComputedStyle(each);
+    if (shown.overflow === "hidden" && each.scrollWidth > each.clientWidth + 1)
+      found.push("cut: " + each.textContent.slice(0, 40));
+    if (box.width && box.left < page.clientWidth && box.right > page.clientWidth + 1 && !each.closest(".table-wrapper, .toc-drawer"))
+      found.push("beyond the edge: " + each.textContent.slice(0, 40));
+  }
+  return found;
+})()"""
+"""What sticks out of a page, as texts."""
+
+
 @pytest.mark.long
 def test_every_link_of_the_site_leads_somewhere(built_site: Path) -> None:
     site = built_site

@@ -247,7 +247,7 @@ def _call(name: str, arguments: list[ast.expr], units: Mapping[str, Unit | None]
 class External(UnitFromParameters, Block):
     """A vector that Python sets between two ticks: ``run["action"] = [0.1, 0.2]``.
 
-    It holds what was set last, and ``initial`` before. See ``aloft.Graph.open`` and ``aloft.gym``.
+    It holds what was set last, and ``initial`` before. See ``aloft.Graph.open`` and ``aloft.environments``.
     In a run that nobody steps it is a constant.
     """
 

@@ -80,7 +80,7 @@ def parameter_names(context: typer.Context, incomplete: str) -> list[str]:
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 JsonBesideTables = Annotated[
-    bool, typer.Option("--json", help="Tables go to standard error, one JSON object to output.")
+    bool, typer.Option("--json", help="Print one JSON object on stdout (tables go to stderr).")
 ]
 GraphFolder = Annotated[
     Path | None,
@@ -93,7 +93,7 @@ Trust = Annotated[
         help="Run the code that the recording names and that is not aloft's; remembered for its content.",
     ),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Only print pass or fail.")]
 NoRecord = Annotated[bool, typer.Option("--no-record", help="Write no recording.")]
 Overrides = Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)]
 CompletedOverrides = Annotated[

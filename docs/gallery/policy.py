@@ -2,9 +2,9 @@
 
 import numpy as np
 
-import aloft.gym
+import aloft.environments
 
-environment = aloft.gym.make(
+environment = aloft.environments.make(
     "push.yaml",
     action="force",
     observation=["place.y.value", "speed.y.value"],

@@ -3,7 +3,7 @@ which are stale.
 
 ::
 
-    python lab/pages/study_data.py keep [--commit C] RESULTS ...   data files and tables from folders of `aloft study`
+    python lab/pages/study_data.py keep [--commit C] RESULTS ...   a data file and tables from folders of `aloft study`
     python lab/pages/study_data.py stale                           what has changed since, by data file; exit 1 if any
     python lab/pages/study_data.py mark                            write that below the tables
 
@@ -45,8 +45,8 @@ STANDS_TILT = 5.0
 OUTCOMES = ("n", "successes", "stands")
 
 
-def rows_of(folder: Path) -> list[dict[str, Any]]:
-    """Return the cells of a study's results, each with its labels and counts of its runs.
+def rows_of(folder: Path, labels: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the cells of a study's results, each with its values of ``labels`` and counts of its runs.
 
     A run *stands* if it did not fall and its torso is at most 5 degrees from upright at the end; a run that was ended
     by a fall has no final tilt.
@@ -54,7 +54,6 @@ def rows_of(folder: Path) -> list[dict[str, Any]]:
     from pyarrow import parquet
 
     runs = parquet.read_table(folder / "runs.parquet").to_pylist()
-    labels = labels_of(folder)
     found: dict[tuple[Any, ...], dict[str, Any]] = {}
     for run in runs:
         key = tuple(run[label] for label in labels)
@@ -103,7 +102,9 @@ def table_of(data: Mapping[str, Any]) -> str:
         counts = f"{row['stands']} of {row['n']} | {row['successes']} of {row['n']}"
         lines.append(f"| {shown} | {counts} | {told} |")
     seeds = data["seeds"]
-    made = f"Seeds {seeds[0]} to {seeds[-1]}, code of commit {data['commit'][:8]}."
+    alike = len({row["n"] for row in data["rows"]}) == 1
+    each = "" if alike else " (a row has as many as it has runs, from the first)"
+    made = f"Seeds {seeds[0]} to {seeds[-1]}{each}, code of commit {data['commit'][:8]}."
     return "\n".join([*lines, "", made]) + "\n"
 
 
@@ -179,18 +180,28 @@ def write_tables(root: Path) -> None:
             path.write_text(text, encoding="utf-8")
 
 
-def keep(root: Path, folder: Path, commit: str) -> Path:
-    """Write the data file of a study's results."""
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    name = summary["study"]
+def keep(root: Path, folders: Sequence[Path], commit: str) -> Path:
+    """Write the data file of a study's results. Of several folders the first has all cells, and later ones replace those
+    that they made with more seeds."""
+    summaries = [
+        json.loads((folder / "summary.json").read_text(encoding="utf-8")) for folder in folders
+    ]
+    name = summaries[0]["study"]
+    labels = labels_of(folders[0])
+    rows: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for folder in folders:
+        for row in rows_of(folder, labels):
+            key = tuple(row[label] for label in labels)
+            if key not in rows or row["n"] > rows[key]["n"]:
+                rows[key] = row
     data = {
         "study": f"graphs/studies/{name}.yaml",
         "commit": commit,
         "measures": [*CONTROLLER, f"graphs/studies/{name}.yaml"],
         "pages": list(PAGES[name]),
-        "seeds": summary["seeds"],
-        "labels": labels_of(folder),
-        "rows": rows_of(folder),
+        "seeds": max((summary["seeds"] for summary in summaries), key=len),
+        "labels": labels,
+        "rows": list(rows.values()),
     }
     path = root / DATA / f"{name}.json"
     path.parent.mkdir(exist_ok=True)
@@ -205,8 +216,7 @@ def main(arguments: Sequence[str]) -> int:
         commit = git(ROOT, "rev-parse", "HEAD")
         if rest[:1] == ["--commit"]:
             commit, rest = rest[1], rest[2:]
-        for folder in rest:
-            print(keep(ROOT, Path(folder), commit))
+        print(keep(ROOT, [Path(folder) for folder in rest], commit))
     elif verb == "stale":
         behind = stale(ROOT)
         for name, changed in behind.items():

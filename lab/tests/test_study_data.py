@@ -62,7 +62,8 @@ def test_runs_that_stand_are_counted_beside_those_that_succeed(
         run("+x", False, None, "fell at 1.998 s: tilt 69.7 deg"),
         run("+y", False, 6.0, "turned 20.8 deg, not within 5.0 deg of 30.0 deg"),
     ])  # fmt: skip
-    ahead, aside = script.rows_of(folder)
+    assert script.labels_of(folder) == ["task"]
+    ahead, aside = script.rows_of(folder, ["task"])
     assert (ahead["n"], ahead["successes"], ahead["stands"]) == (3, 1, 2)
     assert ahead["misses"] == {"flight too short": 1, "fell": 1}
     assert (aside["stands"], aside["misses"]) == (0, {"turn": 1})
@@ -73,7 +74,21 @@ def test_runs_that_stand_are_counted_beside_those_that_succeed(
         "| +x | 2 of 3 | 1 of 3 | 1 fell, 1 flight too short |",
         "| +y | 0 of 1 | 0 of 1 | 1 turn |",
         "",
-        "Seeds 5 to 7, code of commit 01234567.",
+        "Seeds 5 to 7 (a row has as many as it has runs, from the first), code of commit 01234567.",
+    ]
+
+
+def test_cells_with_more_seeds_take_the_place_of_those_with_fewer(
+    script: ModuleType, tmp_path: Path
+) -> None:
+    fall = run("+x", False, None, "fell at 1.998 s")
+    few = results(tmp_path / "few", [fall, run("+y", True, 0.1, "")])
+    more = results(tmp_path / "more", [run("+x", True, 0.1, "")] * 3)
+    (tmp_path / "docs" / "data").mkdir(parents=True)
+    data = json.loads(script.keep(tmp_path, [few, more], "0" * 40).read_text())
+    assert [(row["task"], row["n"], row["stands"]) for row in data["rows"]] == [
+        ("+x", 3, 3),
+        ("+y", 1, 1),
     ]
 
 

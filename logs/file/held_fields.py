@@ -27,7 +27,7 @@ Copy = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)
-class BusPart:
+class FieldGroup:
     """Some fields of the bus in a layout of their own, and the ticks in which they may change.
 
     Attributes:
@@ -67,11 +67,11 @@ class SplitBus:
     """
 
     size: int
-    base: BusPart
-    held: tuple[BusPart, ...]
+    base: FieldGroup
+    held: tuple[FieldGroup, ...]
 
     @cached_property
-    def part_of(self) -> dict[str, int]:
+    def group_of(self) -> dict[str, int]:
         """The number of the held group of each field that is held, by its name."""
         return {f.name: k for k, part in enumerate(self.held) for f in part.layout.fields}
 
@@ -111,15 +111,15 @@ def split_bus(header: Header) -> SplitBus:
         else:
             base.append(field)
     if not groups:
-        whole = BusPart(bus, ((0, bus.size, 0, bus.size),))
+        whole = FieldGroup(bus, ((0, bus.size, 0, bus.size),))
         return SplitBus(bus.size, whole, ())
-    held = tuple(_part(bus, fields, *when) for when, fields in groups.items())
-    return SplitBus(bus.size, _part(bus, base), held)
+    held = tuple(_group(bus, fields, *when) for when, fields in groups.items())
+    return SplitBus(bus.size, _group(bus, base), held)
 
 
-def _part(
+def _group(
     bus: RecordedLayout, fields: Sequence[RecordedField], period: int = 1, offset: int = 0
-) -> BusPart:
+) -> FieldGroup:
     """Lay some fields of the bus out one behind another, by type."""
     lengths = dict.fromkeys(bus.lengths, 0)
     placed = []
@@ -140,4 +140,4 @@ def _part(
             copies[-1] = (copies[-1][0], end, copies[-1][2], until)
         else:
             copies.append((begin, end, to, until))
-    return BusPart(layout, tuple(copies), period, offset)
+    return FieldGroup(layout, tuple(copies), period, offset)

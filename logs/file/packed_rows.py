@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .format import HELD, PACKED, ROWS, Header, RecordedField
-from .held_fields import BusPart, split_bus
+from .held_fields import FieldGroup, split_bus
 from .messages import (
     Content,
     FileMessage,
@@ -57,10 +57,10 @@ class _PackedPiece:
         return np.arange(self.first, self.last + 1, self.period, dtype=np.int64)
 
 
-class PackedPart:
+class PackedGroup:
     """The packed rows of one part of the bus: of its base, or of a held group, whose number is ``held``."""
 
-    def __init__(self, found: Scan, part: BusPart, held: int | None = None) -> None:
+    def __init__(self, found: Scan, part: FieldGroup, held: int | None = None) -> None:
         self._found, self._part = found, part
         self._content = Content.ROWS if held is None else Content.HELD
         self._entity = f"/{ROWS}" if held is None else f"/{HELD}/{held}"
@@ -138,7 +138,8 @@ class PackedPart:
         piece = self._pieces[bisect_left(self._lasts, tick)]
         if self._known is None or self._known[0] is not piece:
             self._known = piece, self.unpack(piece)
-        return self._known[1][(tick - piece.first) // piece.period]
+        row: NDArray[np.uint8] = self._known[1][(tick - piece.first) // piece.period]
+        return row
 
     def all(self, part: tuple[int, int] | None = None) -> NDArray[np.uint8]:
         """Unpack the rows of all ticks, (ticks, bytes), or of each row the bytes ``part`` only, in several
@@ -172,11 +173,11 @@ class PackedRows:
     def __init__(self, found: Scan, header: Header) -> None:
         self._found, self._header = found, header
         self._bus = split_bus(header)
-        self._base = PackedPart(found, self._bus.base)
+        self._base = PackedGroup(found, self._bus.base)
 
     @cached_property
-    def _held(self) -> list[PackedPart]:
-        return [PackedPart(self._found, part, k) for k, part in enumerate(self._bus.held)]
+    def _held(self) -> list[PackedGroup]:
+        return [PackedGroup(self._found, part, k) for k, part in enumerate(self._bus.held)]
 
     @cached_property
     def ticks(self) -> NDArray[np.int64]:
@@ -234,7 +235,7 @@ class PackedRows:
 
     def samples(self, field: RecordedField) -> tuple[NDArray[np.int64], NDArray[Any]]:
         """Return the ticks (n,) at which a field is kept, and its values there, (n, ...)."""
-        number = self._bus.part_of.get(field.name)
+        number = self._bus.group_of.get(field.name)
         packed = self._base if number is None else self._held[number]
         part = self._bus.base if number is None else self._bus.held[number]
         found = packed.all(part.layout.layout().byte_range(field.name))

@@ -17,15 +17,14 @@ from difflib import get_close_matches
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.language.layout import only_field
-from ...runtime.language.parameter_change import ParameterChange
-from ...runtime.running.memory import Snapshot
 from ...runtime.running.sink import Note
+from ...runtime.running.snapshot import Snapshot
 from .format import (
     BUS,
     FORMAT,
@@ -40,6 +39,7 @@ from .format import (
 from .messages import (
     Content,
     Damage,
+    FileMessage,
     NoRunError,
     RecordingError,
     Scan,
@@ -49,6 +49,10 @@ from .messages import (
     tables_at,
 )
 from .packed_rows import MOST_KEPT, PackedRows, TickRows
+
+if TYPE_CHECKING:
+    from ...runtime.language.parameter_change import ParameterChange
+
 
 __all__ = ["RecordedRun", "RecordingError", "read"]
 
@@ -228,14 +232,17 @@ class RecordedRun:
         Raises:
             KeyError: there is no keyframe at that tick.
         """
-        found = self._snapshots[tick]
-        if not isinstance(found, Snapshot):
-            (found,) = _snapshots_in(tables_at(self.scan, found)[1])
+        found: Snapshot | FileMessage = self._snapshots[tick]
+        if isinstance(found, FileMessage):
+            (one,) = _snapshots_in(tables_at(self.scan, found)[1])
+            return one
         return found
 
     @property
     def parameter_changes(self) -> tuple[ParameterChange, ...]:
         """Every live change of a parameter, in order."""
+        from ...runtime.language.parameter_change import ParameterChange
+
         return tuple(ParameterChange(**n.data) for n in self.notes if n.kind == "parameter")
 
     @property

@@ -121,7 +121,7 @@ class Recorder(Sink):
         self._keyframe_period = keyframe_period
         self._periods = flush_period, sync_period
         self._ring, self._split = (ring_time, ring_bytes), split
-        self._parts: HeldParts | None = None
+        self._parts: HeldGroups | None = None
         self._begins = True
         self._live = live
         self._on_warning = on_warning
@@ -186,7 +186,7 @@ class Recorder(Sink):
             remember(code_of(graph.resolved, graph.robot))  # what the user runs he may run again
         about = header_of(self._bound)
         split, (ring_time, ring_bytes) = split_bus(about), self._ring
-        self._parts = HeldParts(split, self._bus) if split.held else None
+        self._parts = HeldGroups(split, self._bus) if split.held else None
         row = space_of(split.base.layout.size)
         row += sum(space_of(part.layout.size) // part.period for part in split.held)
         capacity = min(round(ring_time * rate) * row, ring_bytes) + frame
@@ -391,7 +391,7 @@ class Recorder(Sink):
         return count, unfinished_name(path)
 
 
-class HeldParts:
+class HeldGroups:
     """Gathers the bytes of a row that are put into the ring where some fields are held.
 
     Args:

@@ -28,8 +28,8 @@ from numpy.typing import NDArray
 
 from ...processes.child import report_ready
 from ...runtime.running.failures import describe
-from ...runtime.running.memory import Snapshot
 from ...runtime.running.sink import Note
+from ...runtime.running.snapshot import Snapshot
 from ..file.format import Header
 from ..file.held_fields import split_bus
 from .output_file import OutputFile, cause_of, reserve_output, split_name
@@ -309,7 +309,7 @@ class RecorderProcess:
             (np.array([tick for tick, _ in kept], np.int64), np.array([row for _, row in kept]))
             for kept in self._held
         ]
-        self._write(lambda writer: writer.write_parts(ticks, rows, held))
+        self._write(lambda writer: writer.write_groups(ticks, rows, held))
         self._filled = self._fed_rows = self._held_bytes = 0
         self._held = [[] for _ in self._bus.held]
 

@@ -28,7 +28,7 @@ try:
 except ImportError:  # on Windows, which limits no sizes
     resource = None  # type: ignore[assignment]  # not on Windows
 
-from ...runtime.running.memory import nameless_memory
+from ...runtime.running.snapshot import nameless_memory
 
 ALIGNMENT = 64
 CONTROL = 256

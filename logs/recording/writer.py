@@ -15,18 +15,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.running.memory import Snapshot
-from ...runtime.running.run_result import RunResult
 from ...runtime.running.sink import Note, parameter_note
-from ..file.code import code_of, remember
+from ...runtime.running.snapshot import Snapshot
 from ..file.format import BUS, HELD, KEYFRAMES, PACKED, ROWS, STATE, Header, spans, time_columns
-from ..file.header import make_header
 from ..file.held_fields import split_bus
 from ..file.index import Index
 from ..file.messages import (
@@ -47,6 +44,9 @@ from ..viewing.blueprint import recording_blueprint
 from ..viewing.drawing import RECORDED
 from .output_file import OutputFile, reserve_output
 from .run_stream import RunStream
+
+if TYPE_CHECKING:
+    from ...runtime.running.run_result import RunResult
 
 DRAWN_TICKS, DRAWN_BYTES = 4096, 1 << 25
 """Ticks that are drawn at once and their bytes, at most: the viewer likes few large pieces."""
@@ -134,7 +134,7 @@ class RecordingWriter:
         The rows are copied; curves and the robot in 3D are drawn of several thousand at once.
         """
         if not self._bus.held or not len(ticks):
-            self.write_parts(ticks, rows, ())
+            self.write_groups(ticks, rows, ())
             return
         before = self._before if int(ticks[0]) == self._last + 1 else None
         kept = self._bus.changed(ticks, rows, before)
@@ -143,9 +143,9 @@ class RecordingWriter:
             (ticks[places], part.take(rows[places]))
             for places, part in zip(kept, self._bus.held, strict=True)
         ]
-        self.write_parts(ticks, self._bus.base.take(rows), held)
+        self.write_groups(ticks, self._bus.base.take(rows), held)
 
-    def write_parts(
+    def write_groups(
         self,
         ticks: NDArray[np.int64],
         rows: NDArray[np.uint8],
@@ -347,6 +347,10 @@ def write_recording(path: str | PathLike[str], result: RunResult) -> Recording:
         OSError: the file cannot be written.
         RuntimeError: the run kept no log.
     """
+    # a recorder's process, which has the header, starts without what makes one
+    from ..file.code import code_of, remember
+    from ..file.header import make_header
+
     began = time.perf_counter()
     log = result.log
     if result.graph is None or log is None or log.layout is None:

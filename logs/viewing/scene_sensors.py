@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...hal.sensors.sensor import MountedSensor, mounted_sensors
 from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
 from ...runtime.language.errors import AloftError
 from .contacts import ARROW_RADIUS, force_arrows
 from .drawing import Moments, SceneDisplay
 from .scene_ports import Ports, ports_of
+
+if TYPE_CHECKING:
+    from ...hal.sensors.sensor import MountedSensor
 
 
 def sensor_ports(robot: RobotDescription, ports: Ports) -> dict[str, MountedSensor]:
@@ -21,6 +24,10 @@ def sensor_ports(robot: RobotDescription, ports: Ports) -> dict[str, MountedSens
 
     Sensors of a user's own module that cannot be imported here are left out.
     """
+    if not robot.sensors.mounted:
+        return {}
+    from ...hal.sensors.sensor import mounted_sensors
+
     try:
         sensors = mounted_sensors(robot)
     except (AloftError, ImportError):

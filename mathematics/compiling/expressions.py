@@ -74,15 +74,15 @@ class Expressions:
                 return ArrayKind(kind.shape, bool)
             return kind
         if isinstance(node, ast.IfExp):
-            kind = self._joined(node, [node.body, node.orelse, node.test])
+            kind = self._joined_of(node, [node.body, node.orelse, node.test])
             if kind != NUMBER:
                 return kind
             # a choice between signals or rows is handed on like one
             return self._without_number(node.body)
         if isinstance(node, ast.Compare):
-            return self._joined(node, [node.left, *node.comparators], bool)
+            return self._joined_of(node, [node.left, *node.comparators], bool)
         if isinstance(node, ast.BoolOp):
-            return self._joined(node, node.values, bool)
+            return self._joined_of(node, node.values, bool)
         if isinstance(node, ast.Call):
             if self._is_cross(node):
                 return ArrayKind((3,))
@@ -91,7 +91,7 @@ class Expressions:
                 assert isinstance(a, ArrayKind) and isinstance(b, ArrayKind)
                 return ArrayKind((a.shape[0], b.shape[0]))
             if self._applies_to_elements(node):
-                return self._joined(node, node.args, self._element_of(node))
+                return self._joined_of(node, node.args, self._element_of(node))
             return NUMBER
         return NUMBER if isinstance(node, ast.Constant) else None
 
@@ -118,17 +118,19 @@ class Expressions:
             )
         return bool if function.attr in FLAGS else None if function.attr in KEEPING else float
 
-    def _joined(
+    def _joined_of(
         self, node: ast.expr, parts: Sequence[ast.expr], element: type | None = None
     ) -> Kind:
-        """Return the kind of what is made of each element of some expressions, as NumPy repeats
+        return self._joined(node, [self._kind(each) for each in parts], element)
+
+    def _joined(self, node: ast.expr, kinds: Sequence[Kind], element: type | None = None) -> Kind:
+        """Return the kind of what is made of each element of expressions of some kinds, as NumPy repeats
         them: an array if one is.
 
         Raises:
             EquationError: their sizes do not fit.
         """
-        arrays = [kind for each in parts if isinstance(kind := self._kind(each), ArrayKind)]
-        arrays = [kind for kind in arrays if kind.rank]
+        arrays = [kind for kind in kinds if isinstance(kind, ArrayKind) and kind.rank]
         if not arrays:
             return NUMBER
         shape = arrays[0].shape
@@ -213,7 +215,7 @@ class Expressions:
         ):
             shape = left.shape[:-1] + (right.shape[1:] if right.rank > 1 else ())
             return ArrayKind(shape) if shape else NUMBER
-        kind = self._joined(node, [node.left, node.right])
+        kind = self._joined(node, (left, right))
         if isinstance(kind, ArrayKind):
             return ArrayKind(kind.shape, float) if isinstance(node.op, ast.Div) else kind
         return NUMBER if left is not None and right is not None else None

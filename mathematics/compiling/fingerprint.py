@@ -76,6 +76,19 @@ def closure(kernel: Any) -> list[Any]:
     return list(found.values())
 
 
+def numba_functions(kernel: Any) -> list[Any]:
+    """Return the functions of Numba that a kernel, and those that it calls, name."""
+    from .numba_calls import is_numba
+
+    found: dict[int, Any] = {}
+    for each in closure(kernel):
+        for name in written_code(each).co_names:
+            value = each.__globals__.get(name)
+            if is_numba(value):
+                found[id(value)] = value
+    return list(found.values())
+
+
 def _called(function: Any) -> list[Any]:
     """Return the kernels that a function names."""
     scope = function.__globals__

@@ -18,10 +18,11 @@ from ..kernel import expand
 from .arguments import error_record, type_of
 from .equations import EquationError, check_equations
 from .failures import FAILURES
-from .fingerprint import closure
+from .fingerprint import numba_functions
 from .kernel_call import KernelCall
 from .kernel_registry import written_code
 from .kinds import ArrayKind, Kind, RecordKind, argument_kinds
+from .numba_calls import unseeded
 from .translate import Translator
 
 MOST_LINES = 100_000
@@ -55,7 +56,7 @@ def mistake_in(kernel: Callable[..., Any], arguments: Sequence[Any], *, run: boo
     except EquationError as error:
         return str(error)
     drawing = _draws(kernel)
-    if drawing or not run or any(_calls_numba(each) for each in closure(kernel)):
+    if drawing or not run or numba_functions(kernel):
         return drawing
     return _run_plainly(kernel, arguments)
 
@@ -127,30 +128,16 @@ def _kind_of(value: Any, declared: Kind) -> Kind:
     return declared
 
 
-def _numba_functions(function: Any) -> list[Any]:
-    from .numba_calls import is_numba
-
-    values = (function.__globals__.get(name) for name in written_code(function).co_names)
-    return [value for value in values if is_numba(value)]
-
-
-def _calls_numba(function: Any) -> bool:
-    return bool(_numba_functions(function))
-
-
 def _draws(kernel: Any) -> str:
     """Return what is wrong with a kernel whose functions of Numba draw random numbers."""
-    from .numba_calls import unseeded
-
-    for function in closure(kernel):
-        for each in _numba_functions(function):
-            if drawing := unseeded(each):
-                code = written_code(function)
-                return (
-                    f"{code.co_filename}:{code.co_firstlineno}: kernel {function.__qualname__}: numba function {drawing} "
-                    "draws random numbers without a seed, so no run could be repeated; let a block such as "
-                    "blocks.WhiteNoise draw them"
-                )
+    for each in numba_functions(kernel):
+        if drawing := unseeded(each):
+            code = written_code(kernel)
+            return (
+                f"{code.co_filename}:{code.co_firstlineno}: kernel {kernel.__qualname__}: numba function {drawing} "
+                "draws random numbers without a seed, so no run could be repeated; let a block such as "
+                "blocks.WhiteNoise draw them"
+            )
     return ""
 
 

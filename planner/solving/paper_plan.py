@@ -97,8 +97,8 @@ def variables_near(problem: SimpleProblem, plan: PlannedJump) -> Array:
         start = int(problem.assembly.state_start[k])
         position = at(plan.position, time)
         position[3:7] /= np.linalg.norm(position[3:7])
-        part = min(int(np.searchsorted(mine[1:], grid.times[k], side="right")), 2)
-        rate = stretch[part]
+        piece = min(int(np.searchsorted(mine[1:], grid.times[k], side="right")), 2)
+        rate = stretch[piece]
         speed = rate * at(plan.com_velocity, time)
         state = np.concatenate(
             [position, at(plan.com, time), speed, at(plan.angular_momentum, time)]

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import prod
+from typing import TYPE_CHECKING
 
 from .signals import DTYPES
-from .stages import CheckedGraph
+
+if TYPE_CHECKING:  # so that reading a recording needs nothing that loads a graph
+    from .stages import CheckedGraph
 
 LEAST_BYTES = 4096
 """Bytes of a field from which on a recording holds it between the runs of its block."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from ...mathematics.compiling.fingerprint import numba_functions
 from ...mathematics.compiling.kernel_registry import is_kernel
+from ...mathematics.compiling.numba_calls import uses_blas
 from ..language.errors import ExitCode, RunError
 from ..language.stages import CheckedGraph
 from .kernel_checks import OWN
@@ -25,4 +27,19 @@ def mistakes_of(graph: CheckedGraph) -> dict[str, str]:
         except RunError as error:
             if error.exit_code == ExitCode.BAD_INPUT:
                 found[spec.path] = str(error)
+    return found
+
+
+def tied_to_machine(graph: CheckedGraph) -> list[str]:
+    """Return a word on each block with a function of Numba that uses BLAS, whose bits the machine decides."""
+    found = []
+    for spec in graph.blocks:
+        for step in spec.block_type.named_steps.values():
+            names = (
+                {uses_blas(each) for each in numba_functions(step)} if is_kernel(step) else set()
+            )
+            found += [
+                f"block '{spec.path}': numba function {name} multiplies or solves by BLAS, so its bits depend on the machine"
+                for name in sorted(names - {""})
+            ]
     return found

@@ -7,9 +7,12 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..language.errors import AloftError, ExitCode, RunError
-from ..language.stages import BlockSpec
+
+if TYPE_CHECKING:
+    from ..language.stages import BlockSpec
 
 
 class Hang(BaseException):

@@ -6,10 +6,7 @@ hashing a run and comparing two runs each take one memory copy. Views of inputs 
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +24,8 @@ from ..language.steps import bind_steps
 from .failures import blame
 from .kernel_checks import check_kernels
 from .live_parameters import LiveParameters
+from .snapshot import Snapshot as Snapshot  # noqa: PLC0414  also imported from here
+from .snapshot import nameless_memory as nameless_memory  # noqa: PLC0414
 
 
 class Region:
@@ -78,15 +77,6 @@ def _allocate(layout: Layout, what: str) -> Region:
         f"of shape {list(layout.slots[name].shape)}",
         block=name.rpartition(".")[0].rpartition(".")[0],
     )
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """State of a graph at one instant: bus, declared state and tick."""
-
-    tick: int
-    bus: bytes
-    state: bytes
 
 
 class Memory:
@@ -254,20 +244,3 @@ class BoundGraph:
         self.clock.stopped_by = ""
         for block in self.blocks.values():
             block.load_state()
-
-
-def nameless_memory(size: int, name: str) -> int:
-    """Make memory of ``size`` zero bytes that two processes can share, and return its file
-    descriptor.
-
-    On Linux it is a ``memfd``, elsewhere a file that is deleted at once. So a process that is killed
-    leaves nothing behind, and the other one keeps what had been written. ``name`` is what the
-    system's tools show.
-    """
-    if hasattr(os, "memfd_create"):
-        descriptor = os.memfd_create(name)
-    else:
-        with tempfile.TemporaryFile() as file:
-            descriptor = os.dup(file.fileno())
-    os.ftruncate(descriptor, size)
-    return descriptor

@@ -12,7 +12,7 @@ from aloft.logs.recording.recorder import Recorder
 from aloft.logs.viewing.contacts import force_scale
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import AloftError
-from aloft.studies.film import Camera, Take, instants
+from aloft.studies.film import Camera, Take, extent, instants
 from aloft.studies.offscreen import NoRendererError, Offscreen
 
 from .conftest import run_for_json, run_here
@@ -164,3 +164,13 @@ def test_a_recording_without_a_robot(counted: bytes, tmp_path: Path) -> None:
     (tmp_path / "count.rrd").write_bytes(counted)
     reason = run_for_json("render", str(tmp_path / "count.rrd"), code=2)["reason"]
     assert reason.endswith("count.rrd has no robot: nothing in it says where one is")
+
+
+def test_the_whole_robot_is_in_the_picture_head_and_soles_included(pushed: Path) -> None:
+    run = read(pushed)
+    take = Take(run, "", Camera())
+    bottom, top = extent(take.robot, take.base[:1], take.turn[:1], take.joints[:1])
+    assert 0.6 < top[2] - bottom[2] < 0.8, "BRUCE stands about 0.66 m high"
+    view = take.view(0)
+    sees = view.distance * np.tan(np.radians(45.0 / 2))  # MuJoCo's field of view, upright
+    assert view.look_at[2] + sees > top[2] + 0.05 and view.look_at[2] - sees < bottom[2] - 0.05

@@ -40,7 +40,7 @@ def branch(
     trust: Trust = False,
     as_json: JsonBesideTables = False,
 ) -> None:
-    """Let a recorded run go on from its exact state with other parameters, beside the original."""
+    """Resume a recorded run from any time with different parameters, and compare."""
     from ..branching import branch as branch_run
 
     out = console(to_stderr=as_json)

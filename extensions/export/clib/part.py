@@ -6,7 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+from ....mathematics.compiling.fingerprint import numba_functions
 from ....mathematics.compiling.kernel_call import KernelCall
+from ....mathematics.compiling.numba_calls import name_of
 from ....runtime.language.block import Block, Output
 from ....runtime.language.errors import AloftError
 from ....runtime.language.parameters import Parameters, is_live
@@ -144,6 +146,9 @@ def needs_python(block: Block) -> Iterator[str]:
                 function: Any = call.run
                 name = getattr(getattr(function, "func", function), "__qualname__", "a function")
                 yield f"calls {name}, which is plain Python"
+                continue
+            for called in numba_functions(call.kernel):
+                yield f"calls {name_of(called)}, a function of Numba, which needs its runtime"
 
 
 def _is_empty(kind: type[Block], step: str) -> bool:

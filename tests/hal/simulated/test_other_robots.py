@@ -215,3 +215,6 @@ def test_a_robot_with_feet_need_not_stand() -> None:
         BlockBench(MujocoRobot, {}, robot=leaning)
     robot = BlockBench(MujocoRobot, {"start": {"stand": False}}, robot=leaning)
     assert truth(robot).joint_position == pytest.approx(leaning.standing_position, abs=1e-3)
+    uneven = bruce.changed(standing={**bruce.standing, "left_knee": -1.2})
+    robot = BlockBench(MujocoRobot, {"start": {"stand": False}}, robot=uneven)
+    assert truth(robot).joint_position == pytest.approx(uneven.standing_position, abs=5e-3)

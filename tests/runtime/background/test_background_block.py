@@ -255,7 +255,7 @@ def test_an_error_ends_all_machines() -> None:
 
 
 def test_episodes_of_an_environment_are_equal() -> None:
-    gym = pytest.importorskip("aloft.gym")
+    gym = pytest.importorskip("aloft.environments")
     text = """
 rate: 100 Hz
 duration: 1 s

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 import aloft
+from aloft.extensions.export.clib.part import needs_python
 from aloft.runtime.language.errors import ExitCode, RunError
-from aloft.runtime.running.block_mistakes import mistakes_of
+from aloft.runtime.running.block_mistakes import mistakes_of, tied_to_machine
 from aloft.runtime.running.memory import BoundGraph
 
 BLOCK = '''
@@ -75,3 +76,44 @@ def test_a_right_block_passes(tmp_path: Path) -> None:
     checked = aloft.load(graph_of(tmp_path, "Right", "y.v[:] = a[::-1]", "np.ones(3)")).checked
     assert not mistakes_of(checked)
     BoundGraph(checked)
+
+
+NUMBA = '''
+import numba
+import numpy as np
+from aloft import Block, Field, Output, Signal, kernel
+
+
+class V(Signal):
+    """A vector."""
+
+    v = Field(3, unit="1", text="numbers")
+
+
+@numba.njit
+def product(a):
+    a[:] = np.eye(3) @ a
+
+
+class Solving(Block):
+    """A block."""
+
+    y = Output(V, text="y")
+
+    @kernel
+    @staticmethod
+    def step(y: V) -> None:
+        product(y.v)
+'''
+
+
+def test_blas_in_a_kernel_is_said(tmp_path: Path) -> None:
+    (tmp_path / "solving.py").write_text(NUMBA)
+    file = tmp_path / "g.yaml"
+    file.write_text('rate: 100 Hz\nduration: 1 s\nblocks:\n  b: {use: "solving:Solving"}\n')
+    checked = aloft.load(file).checked
+    (text,) = tied_to_machine(checked)
+    assert text.startswith("block 'b': numba function") and "bits depend on the machine" in text
+    block = BoundGraph(checked).blocks["b"]
+    (reason,) = needs_python(block)
+    assert reason.endswith("solving.product, a function of Numba, which needs its runtime")

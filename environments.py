@@ -2,7 +2,7 @@
 
 ::
 
-    env = aloft.gym.make(
+    env = aloft.environments.make(
         "cart_pole.yaml",
         action="force",                       # a block blocks.External
         observation=["robot.joints.position", "robot.joints.velocity"],  # fields, or whole signals
@@ -37,7 +37,7 @@ from .runtime.running.stepping import SteppedRun
 try:
     import gymnasium
 except ModuleNotFoundError as error:
-    raise ModuleNotFoundError(f"aloft.gym needs Gymnasium: {pip_line('gym')}") from error
+    raise ModuleNotFoundError(f"aloft.environments needs Gymnasium: {pip_line('gym')}") from error
 
 Reward = str | Callable[[SteppedRun], float]
 _MOST_SEEDS = 2**31

@@ -14,7 +14,7 @@ needs("gymnasium")
 import gymnasium
 from gymnasium.utils.env_checker import check_env
 
-from aloft import gym
+from aloft import environments
 
 GRAPH = """
 rate: 100 Hz
@@ -30,8 +30,8 @@ blocks:
 """
 
 
-def environment(graph: str = GRAPH, **options: object) -> gym.GraphEnvironment:
-    return gym.make(
+def environment(graph: str = GRAPH, **options: object) -> environments.GraphEnvironment:
+    return environments.make(
         graph, action="action", observation=["place.y.value", "speed.y.value"],
         reward="reward.y.value", ticks=5, action_limits=(-10.0, 10.0), **options,  # type: ignore[arg-type]
     )  # fmt: skip
@@ -104,7 +104,7 @@ def test_normalised_actions_stand_for_the_limits() -> None:
         found.append(env.step(np.array([action]))[0])
     assert np.array_equal(*found) and env.action_space.high == [1.0]
     with pytest.raises(AloftError, match="normalised actions need finite action_limits"):
-        gym.make(
+        environments.make(
             GRAPH, action="action", observation="place.y.value", reward="reward.y.value",
             action_limits=(-1.0, np.inf), normalised=True,
         )  # fmt: skip
@@ -112,15 +112,17 @@ def test_normalised_actions_stand_for_the_limits() -> None:
 
 def test_many_live_in_one_process() -> None:
     graph = load(GRAPH)
-    environments = [
-        gym.make(graph, action="action", observation="place.y.value", reward=lambda run: run.time)
+    many = [
+        environments.make(
+            graph, action="action", observation="place.y.value", reward=lambda run: run.time
+        )
         for _ in range(8)
     ]
-    for number, env in enumerate(environments):
+    for number, env in enumerate(many):
         env.reset(seed=number)
-    found = [env.step(np.ones(1))[0].item() for env in environments]
+    found = [env.step(np.ones(1))[0].item() for env in many]
     assert len(set(found)) == 8
-    assert environments[0].step(np.ones(1))[1] == pytest.approx(0.03)
+    assert many[0].step(np.ones(1))[1] == pytest.approx(0.03)
 
 
 @pytest.mark.parametrize(
@@ -138,7 +140,7 @@ def test_mistakes(options: dict[str, object], error: type[Exception], message: s
         "action": "action", "observation": "place.y.value", "reward": "reward.y.value",
     }  # fmt: skip
     with pytest.raises(error, match=message):
-        gym.make(GRAPH, **{**base, **options})  # type: ignore[arg-type]
+        environments.make(GRAPH, **{**base, **options})  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("ticks", [1, 5])
@@ -147,7 +149,7 @@ def test_a_fall_in_the_last_tick_is_a_fall(ticks: int) -> None:
     text = GRAPH.replace(
         "blocks.WhiteNoise, with: {std: 0.1", "blocks.Constant, with: {value: [0.0]"
     )
-    env = gym.make(
+    env = environments.make(
         text.replace("upper: 0.3", "upper: 0.975"), action="action", observation="place.y",
         reward="reward.y", ticks=ticks,
     )  # fmt: skip
@@ -166,7 +168,7 @@ def test_rounding_at_a_limit_is_no_mistake() -> None:
     pairs = [(-0.1, 0.3), (-1.1, 2.2), (0.0, 0.3), *rng.uniform(-5.0, 5.0, (20, 2)).round(2)]
     for pair in pairs:
         low, high = sorted(float(each) for each in pair)
-        env = gym.make(
+        env = environments.make(
             GRAPH, action="action", observation="place.y", reward="reward.y",
             action_limits=(low, high),
         )  # fmt: skip
@@ -183,11 +185,13 @@ def test_rounding_at_a_limit_is_no_mistake() -> None:
 
 
 def test_a_port_is_all_its_fields() -> None:
-    env = gym.make(GRAPH, action="action", observation=["place.y", "bounds.ok"], reward="reward.y")
+    env = environments.make(
+        GRAPH, action="action", observation=["place.y", "bounds.ok"], reward="reward.y"
+    )
     observation, _ = env.reset(seed=1)
     assert observation.shape == (2,) and observation[1] == 1.0
     assert env.step(np.ones(1))[1] == env._running()["reward.y.value"][0]
     wide = GRAPH.replace("{std: 0.1,", "{std: 0.1, n: 2,").replace("a: action.y,", "a: noise.y,")
     wide = wide.replace("blocks.Sum", "blocks.Sum, with: {n: 2}").split("  place:")[0]
     with pytest.raises(AloftError, match=r"the reward speed\.y has 2 numbers, expected one"):
-        gym.make(wide, action="action", observation="speed.y", reward="speed.y")
+        environments.make(wide, action="action", observation="speed.y", reward="speed.y")
