@@ -217,8 +217,8 @@ def test_a_request_to_stop_comes_in_the_same_tick(fuse: bool) -> None:
 def test_a_failure_names_the_block(fuse: bool) -> None:
     result = Executor(graph(limit=3), fuse=fuse).run(30)
     assert result.reason == (
-        "block 'slow' failed at tick 11 (0.022 s): ZeroDivisionError: compiled kernel "
-        f"{__name__}.divide divided by zero"
+        "block 'slow' failed at tick 11 (0.022 s): ZeroDivisionError: "
+        f"{__file__}:53: kernel divide divided by zero"
     )
     assert result.error is not None and (result.error.block, result.error.tick) == ("slow", 11)
 
