@@ -79,6 +79,7 @@ plans: $(COMPLETE)  ## make the shipped plans anew, one for every file in graphs
 docs: $(COMPLETE)  ## make what is generated under docs/
 	@$(BIN)/aloft blocks --markdown > docs/blocks.md
 	@$(BIN)/python lab/pages/refresh.py
+	@$(BIN)/python lab/pages/study_data.py mark
 	@$(BIN)/python lab/pages/make_pictures.py
 
 site: $(COMPLETE)  ## build the documentation as a site in site/, which any web server serves; other versions there stay

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
+from .log_import import import_log
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, number, print_json, print_warning, say, table
 from .shared.viewing import read
@@ -24,6 +25,7 @@ log = typer.Typer(
 )
 
 File = Annotated[Path, typer.Argument(help="The recording, a file .rrd.")]
+log.command("import")(import_log)
 
 
 @log.command("info")

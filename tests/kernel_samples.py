@@ -450,7 +450,12 @@ UNUSED = {
         np.ones((3, 3)), np.zeros(4), np.zeros((3, 3)), np.zeros(4),
     ),
     "aloft.blocks.control.balance_target.add_quadratic_growth": (np.ones(3), 0.6, 0.25, np.zeros(3), np.zeros(3)),
-    "aloft.blocks.general.sources.first_tick": (0.5, 0.002),
+    "aloft.mathematics.ticks.in_ticks": (0.5, 0.002),
+    "aloft.mathematics.ticks.first_tick": (0.5, 0.002),
+    "aloft.mathematics.ticks.since_begin": (1001.0, 3.0, 333.25),
+    "aloft.mathematics.rotations.between": (
+        np.array([0.0, 0.0, 0.6, 0.8]), np.array([0.0, 0.6, 0.0, -0.8]), 0.3, np.zeros(4),
+    ),
     "aloft.mathematics.linear_algebra.add_product": (POSE, POSE[0], np.ones(4)),
     "aloft.mathematics.linear_algebra.multiply_matrices": (POSE, TARGET[1:], np.zeros((4, 3))),
     "aloft.mathematics.linear_systems.matrix_exponential": (

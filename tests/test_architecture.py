@@ -81,6 +81,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "blocks/jumping": ("blocks/signals", "mathematics", "robots", "runtime/language", "planner"),
     "blocks/scoring": ("blocks/signals", "mathematics", "robots", "runtime/language"),
     "hal": ("processes", "files", "blocks/signals", "mathematics", "robots", "runtime/language"),
+    "hal/log": ("hal", "files", "blocks/signals", "mathematics", "robots", "runtime/language", "logs/file"),
     "logs/file": ("files", "robots", "runtime/language", "runtime/running"),
     "logs/viewing": ("files", "logs/file", "hal/sensors", "mathematics", "robots", "runtime/language"),
     "logs/recording": (

@@ -49,6 +49,7 @@ ROOMS = (
 HOT = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool", *vars(arrays)} - {"Any"}
 NOT_HOT = {
+    "mathematics.ticks.all_in_ticks": "of a table, in setup",
     "blocks.signals.robot.drive_conditions": "of an error byte, for people",
     "blocks.signals.robot.describe_conditions": "of an error byte, for people",
     "blocks.signals.robot.is_critical": "of an error byte, by integer arithmetic",

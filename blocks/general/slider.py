@@ -6,7 +6,12 @@ from collections.abc import Iterable
 
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Context, Output, UnmetRequirement
-from ...runtime.language.parameters import ScalarOrVector, live_parameter, parameter
+from ...runtime.language.parameters import (
+    Parameters,
+    ScalarOrVector,
+    live_parameter,
+    parameter,
+)
 from .vectors import SourceParameters, UnitFromParameters, Vector, VectorParameters
 
 
@@ -33,8 +38,9 @@ class Slider(UnitFromParameters, Block):
     y = Output(Vector, text="the value, within its ends")
 
     @classmethod
-    def requires(cls, params: Params, context: Context) -> Iterable[UnmetRequirement]:
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report ends that cross."""
+        assert isinstance(params, cls.Params)
         if params.lower > params.upper:
             yield UnmetRequirement(
                 "the lower end is above the upper one",

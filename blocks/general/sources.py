@@ -146,19 +146,21 @@ class Pulse(UnitFromParameters, Block):
 
 
 class SineWave(UnitFromParameters, Block):
-    """A sine of time in every element: y = offset + amplitude sin(2 pi frequency t + phase)."""
+    """A sine of time in every element: y = offset + amplitude sin(2 pi frequency t + phase).
 
-    class Params(SourceParameters):
+    Each parameter is one number for all ``n`` elements, or a list with one for each.
+    """
+
+    class Params(VectorParameters, SourceParameters):
         in_unit = (
             "amplitude",
             "offset",
         )
 
-        n: int = parameter(1, ge=1, text="elements")
-        amplitude: float = live_parameter(1.0, text="half of peak to peak")
-        frequency: float = live_parameter(1.0, unit="Hz", ge=0.0, text="oscillations per second")
-        phase: float = live_parameter(0.0, unit="rad", text="angle at time zero")
-        offset: float = live_parameter(0.0, text="the mean")
+        amplitude: ScalarOrVector = live_parameter(1.0, text="half of peak to peak")
+        frequency: ScalarOrVector = live_parameter(1.0, unit="Hz", text="oscillations per second")
+        phase: ScalarOrVector = live_parameter(0.0, unit="rad", text="angle at time zero")
+        offset: ScalarOrVector = live_parameter(0.0, text="the mean")
 
     params: Params
     y = Output(Vector, text="the sine")
@@ -167,8 +169,10 @@ class SineWave(UnitFromParameters, Block):
     @staticmethod
     def step(y: Vector, params: Params, clock: Clock) -> None:
         time = clock.base_period * clock.tick
-        angle = 2.0 * math.pi * params.frequency * time + params.phase
-        y.value[:] = params.offset + params.amplitude * sin(angle)
+        y.value[:] = 2.0 * math.pi * params.frequency * time + params.phase
+        for i in range(y.value.shape[0]):
+            y.value[i] = sin(y.value[i])
+        y.value[:] = params.offset + params.amplitude * y.value
 
 
 class Chirp(UnitFromParameters, Block):

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import sqrt
+from typing import Literal
 
+from ...mathematics.arrays import Array1D
+from ...mathematics.elementary import atan2, cos, sin
 from ...mathematics.kernel import kernel
-from ...mathematics.rotations import conjugate, logarithm, multiply
+from ...mathematics.rotations import conjugate, logarithm, multiply, rotate
 from ...runtime.language.block import Block, Input, Metric, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
@@ -38,6 +41,11 @@ class EstimatorRecord(Signal):
     lift_off = Field(KINDS, text="errors at the last lift-off")
     touchdown = Field(KINDS, text="errors at the last touchdown")
     landings = Field(dtype="int64", text="flights that have ended")
+    yaw = Field(
+        unit="rad", text="from the estimate's world to that of the truth, by its first sample"
+    )
+    start = Field(3, unit="m", text="first estimated place, in the estimate's world")
+    true_start = Field(3, unit="m", text="first true place, in the world of the truth")
 
 
 class EstimatorScratch(Signal):
@@ -46,6 +54,9 @@ class EstimatorScratch(Signal):
     error = Field(3, text="of a position, a velocity or an orientation")
     squares = Field(KINDS, text="of the errors of the tick")
     turn = Field(4, unit="", text="from the true to the estimated orientation")
+    position = Field(3, unit="m", text="estimated place in the world of the truth")
+    velocity = Field(3, unit="m/s", text="estimated velocity there")
+    orientation = Field(4, unit="", text="estimated orientation there")
 
 
 class EstimatorScore(Block):
@@ -65,12 +76,19 @@ class EstimatorScore(Block):
     ``_touchdown_m`` of the last flight, ``_end_m`` at the end of the run. ``estimator_flights``
     counts the flights, so after several jumps ``_end_m`` is the drift over that many.
 
+    With ``align: start`` the estimate is turned about the vertical and moved so that its first sample has the true yaw and place: for
+    motion capture, whose world is its own.
+
     Put it into a graph with ``include: [scores/estimator.yaml]``.
     """
 
     class Params(Parameters):
         flight_confirmation: float = parameter(
             0.02, unit="s", gt=0, text="all points unloaded for this long is a flight"
+        )
+        align: Literal["world", "start"] = parameter(
+            "world",
+            text="the truth is in the estimate's world, or, by motion capture, in one that place and yaw of the first sample give",
         )
 
     Scratch = EstimatorScratch
@@ -89,7 +107,8 @@ class EstimatorScore(Block):
         scratch: EstimatorScratch,
         period: float,
     ) -> None:
-        find_errors(truth, base, record, scratch)
+        align_base(base, truth, record, scratch, params.align == "start")
+        find_errors(truth, record, scratch)
         errors, squares = record.last, scratch.squares
         squares[:] = errors * errors
         record.ticks += 1
@@ -141,17 +160,49 @@ class EstimatorScore(Block):
 
 
 @kernel
-def find_errors(
-    truth: RobotTruth, base: BaseState, record: EstimatorRecord, scratch: EstimatorScratch
+def align_base(
+    base: BaseState,
+    truth: RobotTruth,
+    record: EstimatorRecord,
+    scratch: EstimatorScratch,
+    by_start: bool,
 ) -> None:
+    """Turn the estimate into the world of the truth: by nothing, or by yaw and place of the first sample."""
+    scratch.position[:] = base.position
+    scratch.velocity[:] = base.linear_velocity
+    scratch.orientation[:] = base.orientation
+    if not by_start:
+        return
+    if record.ticks == 0:
+        record.yaw = heading(truth.base_orientation) - heading(base.orientation)
+        record.start[:] = base.position
+        record.true_start[:] = truth.base_position
+    turn = scratch.turn
+    turn[0], turn[1], turn[2], turn[3] = 0.0, 0.0, sin(0.5 * record.yaw), cos(0.5 * record.yaw)
+    scratch.position[:] -= record.start
+    rotate(turn, scratch.position, scratch.position)
+    scratch.position[:] += record.true_start
+    rotate(turn, scratch.velocity, scratch.velocity)
+    multiply(turn, scratch.orientation, scratch.orientation)
+
+
+@kernel
+def heading(orientation: Array1D) -> float:
+    """Return the yaw [rad] of the x axis of an orientation."""
+    x, y, z, w = orientation[0], orientation[1], orientation[2], orientation[3]
+    return atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+
+
+@kernel
+def find_errors(truth: RobotTruth, record: EstimatorRecord, scratch: EstimatorScratch) -> None:
     """Find the errors of this tick, into ``record.last``."""
     error, turn = scratch.error, scratch.turn
-    error[:] = base.position - truth.base_position
+    error[:] = scratch.position - truth.base_position
     record.last[0] = magnitude(error)
-    error[:] = base.linear_velocity - truth.base_linear_velocity
+    error[:] = scratch.velocity - truth.base_linear_velocity
     record.last[1] = magnitude(error)
     conjugate(truth.base_orientation, turn)
-    multiply(base.orientation, turn, turn)
+    multiply(scratch.orientation, turn, turn)
     logarithm(turn, error)
     record.last[2] = magnitude(error)
     record.last[3] = sqrt(error[0] * error[0] + error[1] * error[1])

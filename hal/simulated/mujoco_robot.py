@@ -312,6 +312,18 @@ class MujocoRobot(SimulatedRobot):
         """Export the parts of the simulator's state: positions and velocities by joint, and the rest."""
         return {"physics.integration": integration_elements(self.plant.model)}
 
+    def warnings(self) -> Sequence[str]:
+        """Say where a play of the gears that is asked for multiplies zero."""
+        backlash = self.params.sensors.encoders.backlash
+        if backlash == 0.0 or np.any(self.robot.motors.gear_play):
+            return ()
+        return (
+            (
+                f"sensors.encoders.backlash: {backlash:g} does nothing: it is a multiple of gear_play [rad], which "
+                f"{self.robot.name} does not have; write gear_play under profiles in the robot's YAML"
+            ),
+        )
+
     def metrics(self) -> Mapping[str, Metric]:
         """Return the values that were drawn from the seed, and what the drives do not give of the gains."""
         found = self.plant.metrics()

@@ -138,7 +138,8 @@ class PackedGroup:
         piece = self._pieces[bisect_left(self._lasts, tick)]
         if self._known is None or self._known[0] is not piece:
             self._known = piece, self.unpack(piece)
-        return self._known[1][(tick - piece.first) // piece.period]
+        row: NDArray[np.uint8] = self._known[1][(tick - piece.first) // piece.period]
+        return row
 
     def all(self, part: tuple[int, int] | None = None) -> NDArray[np.uint8]:
         """Unpack the rows of all ticks, (ticks, bytes), or of each row the bytes ``part`` only, in several

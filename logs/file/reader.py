@@ -232,9 +232,10 @@ class RecordedRun:
         Raises:
             KeyError: there is no keyframe at that tick.
         """
-        found = self._snapshots[tick]
+        found: Snapshot | FileMessage = self._snapshots[tick]
         if isinstance(found, FileMessage):
-            (found,) = _snapshots_in(tables_at(self.scan, found)[1])
+            (one,) = _snapshots_in(tables_at(self.scan, found)[1])
+            return one
         return found
 
     @property

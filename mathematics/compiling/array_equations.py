@@ -12,7 +12,7 @@ from .kinds import NUMBER, ArrayKind
 from .slices import Cut, Slices, called, minus, plus
 
 
-class Place(NamedTuple):
+class ArrayPart(NamedTuple):
     """Which part of which array an expression is: for each dimension a number or a slice."""
 
     array: str
@@ -352,14 +352,14 @@ class ArrayEquations(Slices):
 
         visit(value, False)
 
-    def _place_of(self, node: ast.expr) -> Place:
+    def _place_of(self, node: ast.expr) -> ArrayPart:
         whole, indices = node, list[tuple[str, ...]]()
         while isinstance(whole, ast.Subscript):
             found: list[tuple[str, ...]] = []
             for index in indices_of(whole):
                 if isinstance(index, Cut):
-                    cut = ast.unparse(index.first), str(index.step), ast.unparse(index.length)
-                    found.append(cut)
+                    bounds = ast.unparse(index.first), str(index.step), ast.unparse(index.length)
+                    found.append(bounds)
                 else:
                     found.append((ast.unparse(index),))
             indices, whole = found + indices, whole.value
@@ -368,7 +368,7 @@ class ArrayEquations(Slices):
         for k in range(len(indices), rank):
             size = self._size_of(whole, k)
             indices.append(("0", "1", "?" if size is None else ast.unparse(size)))
-        return Place(self._path(node), tuple(indices))
+        return ArrayPart(self._path(node), tuple(indices))
 
     def _path(self, node: ast.expr) -> str:
         """Return the array that an expression is, or is a part of, as text; empty where it is
@@ -405,20 +405,22 @@ class ArrayEquations(Slices):
         return node
 
 
-def _place_in(cut: Cut, place: ast.expr) -> ast.expr:
+def _place_in(bounds: Cut, place: ast.expr) -> ast.expr:
     """Return the index of place ``k`` of a slice."""
-    first = copy.deepcopy(cut.first)
-    if cut.step == 1:
+    first = copy.deepcopy(bounds.first)
+    if bounds.step == 1:
         return plus(first, place)
     if isinstance(place, ast.Constant):
-        return plus(first, ast.Constant(cut.step * place.value))  # type: ignore[operator]  # a number
+        return plus(first, ast.Constant(bounds.step * place.value))  # type: ignore[operator]  # a number
     gone = (
-        place if abs(cut.step) == 1 else ast.BinOp(ast.Constant(abs(cut.step)), ast.Mult(), place)
+        place
+        if abs(bounds.step) == 1
+        else ast.BinOp(ast.Constant(abs(bounds.step)), ast.Mult(), place)
     )
-    return plus(first, gone) if cut.step > 0 else minus(first, gone)
+    return plus(first, gone) if bounds.step > 0 else minus(first, gone)
 
 
-def _apart_or_same(a: Place, b: Place) -> bool:
+def _apart_or_same(a: ArrayPart, b: ArrayPart) -> bool:
     """Return whether two parts of an array are the same, or have no element in common.
 
     Rows ``A[i, :]`` and ``A[j, :]`` count as such: element k of one is no other element of the other.

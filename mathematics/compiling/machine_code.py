@@ -17,7 +17,7 @@ from . import store
 
 ENTRY = "aloft_entry"
 """The name of the only function that the object file of a kernel exports."""
-OPTIONS = "strict floating point, errors as in Python, loops kept, 5"
+OPTIONS = "strict floating point, errors as in Python, loops kept, O2, 6"
 """Options of the compiler; the number at the end counts changes of the calling convention."""
 OLDEST = {
     "x86_64-unknown-linux-gnu": "x86-64",
@@ -135,7 +135,7 @@ def _optimised(assembly: str, triple: str, machine: Any) -> Any:
     module.triple = triple
     module.data_layout = str(machine.target_data)
     module.verify()
-    options = binding.create_pipeline_tuning_options(speed_level=3)
+    options = binding.create_pipeline_tuning_options(speed_level=2)
     options.loop_vectorization, options.slp_vectorization = True, False
     options.loop_unrolling = False  # a third of the time of compiling, and no gain in a tick
     builder = binding.create_pass_builder(machine, options)

@@ -97,15 +97,15 @@ class Slices(Expressions):
                 text = f"{ast.unparse(node)} reaches beyond {ast.unparse(node.value)}, which has {int(size)} elements"
                 raise self._error(node, text)
             places = range(*slice(lower, upper, step).indices(size))
-            cut = Cut(ast.Constant(places.start), step, ast.Constant(len(places)))
+            bounds = Cut(ast.Constant(places.start), step, ast.Constant(len(places)))
         else:
-            cut = (
+            bounds = (
                 self._simple_cut(part, lower, upper, size, node, dimension) if step == 1 else None
             ) or (self._general_cut(part, step, node, dimension))
-        for each in ast.walk(cut):
+        for each in ast.walk(bounds):
             if not hasattr(each, "lineno"):
                 ast.copy_location(each, node)
-        return cut
+        return bounds
 
     def _simple_cut(
         self, part: ast.Slice, lower: int | None, upper: int | None, size: int | None,

@@ -35,6 +35,8 @@ LIGHTEST, ROUNDEST = 1e-11, 1e-12
 
 def split_share(body: Inertial) -> float:
     """Return the share of a body with several joints that each of its links but the last has."""
+    if not np.isfinite(body.inertia).all():
+        return SHARE  # a fault that is told of the description
     least = float(np.linalg.eigvalsh(body.inertia)[0])
     heavy = SPLIT * body.mass > LIGHTEST and SPLIT * least > ROUNDEST
     return SPLIT if heavy else SHARE

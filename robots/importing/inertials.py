@@ -131,6 +131,8 @@ def _compiled(spec: Any) -> tuple[Any, str]:
 
 def _is_possible(mass: float, tensor: Array) -> bool:
     """Check whether MuJoCo takes a mass and an inertia for those of a body that moves."""
+    if not (math.isfinite(mass) and np.isfinite(tensor).all()):
+        return False
     least, middle, most = np.linalg.eigvalsh(tensor)
     return bool(mass > 1e-14 and least > 1e-14 and least + middle >= most)
 

@@ -142,3 +142,17 @@ def test_equal_frequencies_make_a_plain_sine() -> None:
             50, start_frequency=3.0, end_frequency=3.0, sweep=sweep, amplitude=2.0, offset=0.5
         )
         np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_a_sine_of_each_element() -> None:
+    given = {
+        "n": 3,
+        "amplitude": [1.0, 2.0, 3.0],
+        "frequency": ["10 Hz", 20.0, 30.0],
+        "phase": ["0 deg", "90 deg", 0.0],
+    }
+    bench = BlockBench(SineWave, {**given, "offset": 0.5}, rate=1000.0)
+    bench.clock.tick = 7
+    bench.step()
+    angle = 2.0 * np.pi * np.array([10.0, 20.0, 30.0]) * 0.007 + [0.0, np.pi / 2.0, 0.0]
+    assert bench.get("y").value == pytest.approx(0.5 + np.array([1.0, 2.0, 3.0]) * np.sin(angle))

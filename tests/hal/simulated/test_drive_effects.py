@@ -328,3 +328,14 @@ def test_the_voltage_of_the_pack_is_reported() -> None:
     robot.block.emit()
     voltage = robot.get("health").voltage
     assert (voltage == voltage[0]).all() and 13.0 < voltage[0] < 15.0
+
+
+def test_a_play_that_multiplies_zero_is_told() -> None:
+    from aloft.hal.simulated.mujoco_robot import MujocoRobot
+    from aloft.runtime.testing.bench import BlockBench
+
+    backlash = {"sensors": {"encoders": {"backlash": 0.1}}}
+    told = BlockBench(MujocoRobot, backlash, robot="solo12").block.warnings()
+    assert "sensors.encoders.backlash: 0.1 does nothing" in told[0] and "gear_play" in told[0]
+    assert not BlockBench(MujocoRobot, backlash, robot="bruce").block.warnings()
+    assert not BlockBench(MujocoRobot, robot="solo12").block.warnings()

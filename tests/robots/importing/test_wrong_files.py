@@ -320,3 +320,11 @@ def test_links_and_joints_may_be_called_by_numbers(tmp_path: Path) -> None:
     written = new_yaml(tmp_path / "robot.urdf", tmp_path / "robot.yaml").text
     (tmp_path / "robot.yaml").write_text(written)
     assert [joint.name for joint in read(tmp_path / "robot.yaml").description.joints] == ["3"]
+
+
+@pytest.mark.parametrize("value", ["nan", "inf"])
+def test_an_inertia_that_is_no_number_in_mjcf(value: str, tmp_path: Path) -> None:
+    joints = '<joint name="a" axis="0 1 0"/><joint name="b" axis="1 0 0"/>'
+    inertial = f'<inertial pos="0 0 0" mass="1" diaginertia="{value} 1 1"/>'
+    text = f'<mujoco><worldbody><body name="x">{joints}{inertial}</body></worldbody></mujoco>'
+    refusal(tmp_path, text, "robot.xml")

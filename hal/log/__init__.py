@@ -1,0 +1,1 @@
+"""A log of a robot that plays the robot."""
