@@ -148,7 +148,10 @@ class ExpressionTranslator:
             case ast.Call():
                 return self._call(node)
             case _:
-                raise NotCompilable(f"compiled kernels have no {type(node).__name__.lower()}")
+                text = "put it into an @numba.njit function and call that"
+                raise NotCompilable(
+                    f"compiled kernels have no {type(node).__name__.lower()}; {text}"
+                )
 
     def _constant(self, value: Any) -> Value:
         if isinstance(value, tuple):
@@ -396,7 +399,7 @@ def origin_of(function: Any) -> int:
     return int.from_bytes(hashlib.blake2b(name, digest_size=2).digest(), "big") >> 1
 
 
-_NOT_CALLED = "no kernel, and nothing that kernels may call"
+_NOT_CALLED = "no kernel, and nothing that kernels may call; put it into an @numba.njit function and call that"
 
 
 def _is_flag(node: ast.expr) -> bool:

@@ -121,7 +121,10 @@ class _Function(ExpressionTranslator):
             case ast.Break():
                 self._code.jump(self._loops[-1][1])
             case _:
-                raise NotCompilable(f"compiled kernels have no {type(node).__name__.lower()}")
+                text = "put it into an @numba.njit function and call that"
+                raise NotCompilable(
+                    f"compiled kernels have no {type(node).__name__.lower()}; {text}"
+                )
 
     def _assign(self, target: ast.expr, value: Value) -> None:
         if isinstance(target, ast.Name):
