@@ -12,7 +12,7 @@ from .kinds import NUMBER, ArrayKind
 from .slices import Cut, Slices, called, minus, plus
 
 
-class ArrayPart(NamedTuple):
+class ArraySelection(NamedTuple):
     """Which part of which array an expression is: for each dimension a number or a slice."""
 
     array: str
@@ -352,7 +352,7 @@ class ArrayEquations(Slices):
 
         visit(value, False)
 
-    def _place_of(self, node: ast.expr) -> ArrayPart:
+    def _place_of(self, node: ast.expr) -> ArraySelection:
         whole, indices = node, list[tuple[str, ...]]()
         while isinstance(whole, ast.Subscript):
             found: list[tuple[str, ...]] = []
@@ -368,7 +368,7 @@ class ArrayEquations(Slices):
         for k in range(len(indices), rank):
             size = self._size_of(whole, k)
             indices.append(("0", "1", "?" if size is None else ast.unparse(size)))
-        return ArrayPart(self._path(node), tuple(indices))
+        return ArraySelection(self._path(node), tuple(indices))
 
     def _path(self, node: ast.expr) -> str:
         """Return the array that an expression is, or is a part of, as text; empty where it is
@@ -420,7 +420,7 @@ def _place_in(bounds: Cut, place: ast.expr) -> ast.expr:
     return plus(first, gone) if bounds.step > 0 else minus(first, gone)
 
 
-def _apart_or_same(a: ArrayPart, b: ArrayPart) -> bool:
+def _apart_or_same(a: ArraySelection, b: ArraySelection) -> bool:
     """Return whether two parts of an array are the same, or have no element in common.
 
     Rows ``A[i, :]`` and ``A[j, :]`` count as such: element k of one is no other element of the other.

@@ -139,4 +139,4 @@ def test_what_is_refused(recording: Path, folder: Path, call_json: CallJson) -> 
         in reason(name, "--from-tick", "70", "--until-tick", "60")
     )
     (folder / "other.rrd").write_bytes(b"RRF2 nothing")
-    assert "other.rrd was cut off before its beginning was written" in reason("other.rrd")
+    assert "other.rrd is not a recording: Rerun cannot read it" in reason("other.rrd")
