@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...runtime.language.errors import pip_line
+from ...files.pip_line import pip_line
 
 MOST_BYTES = 8_000_000_000
 """Numbers of a log in memory; a larger one is refused before they are read."""

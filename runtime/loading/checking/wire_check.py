@@ -350,9 +350,11 @@ def _compare_units(
     if given is None or wanted.unit is None or given.matches(wanted.unit):
         return
     if given.offset != wanted.unit.offset:
-        zeros = (f"{unit}, whose zero is {unit.offset:g}" for unit in (wanted.unit, given))
+        expected, found = (
+            f"{unit}, whose zero is {unit.offset:g}" for unit in (wanted.unit, given)
+        )
         yield Mismatch(
-            Code.UNIT, f"field {name!r} has another zero", *zeros,
+            Code.UNIT, f"field {name!r} has another zero", expected, found,
             "convert it in a block between: blocks.Expression, such as u + 273.15",
         )  # fmt: skip
     elif given.same_dimension(wanted.unit):

@@ -146,7 +146,10 @@ def test_a_motor_far_from_the_standing_pose_is_not_enabled() -> None:
             {"offset": None},
             "left_knee_motor: not calibrated, an `offset`: do step 3 of extensions/commissioning/bring",
         ),
-        ({"high": None}, "left_knee_motor: not calibrated, `low` and `high`: do step 4 of docs/"),
+        (
+            {"high": None},
+            "left_knee_motor: not calibrated, `low` and `high`: do step 4 of extensions/commissioning/",
+        ),
     ],
 )
 def test_a_motor_that_was_not_calibrated_is_not_enabled(

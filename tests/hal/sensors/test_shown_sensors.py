@@ -34,7 +34,7 @@ blocks:
 PUBLISH = """\
   publish:
     use: ros2.Publish
-    with: {topic: /left_sole, type: geometry_msgs/msg/WrenchStamped, texts: {frame_id: left_foot}}
+    with: {topic: /left_sole, type: geometry_msgs/msg/WrenchStamped, texts: {frame_id: left_foot}, frame: left_foot}
     in: {message: {wrench_force: robot.left_sole.force, wrench_torque: robot.left_sole.torque}}
 """
 

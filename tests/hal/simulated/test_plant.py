@@ -123,7 +123,7 @@ def test_machine_code_and_python_simulate_the_same_bytes() -> None:
 def test_without_the_address_of_its_functions_python_calls_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(physics_step, "_addresses", lambda: (0, 0))
+    monkeypatch.setattr(physics_step, "_address", lambda name: 0)
     robot, seen = run(5)
     assert not robot.block._ticking.native
     monkeypatch.undo()
