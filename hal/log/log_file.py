@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ...mathematics.arrays import Array
 from ...files.pip_line import pip_line
+from ...mathematics.arrays import Array
 
 MOST_BYTES = 8_000_000_000
 """Numbers of a log in memory; a larger one is refused before they are read."""
