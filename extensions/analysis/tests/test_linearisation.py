@@ -17,7 +17,7 @@ GRAPHS = Path(__file__).parents[3] / "graphs"
 PROJECTS = Path(__file__).parents[3] / "docs" / "projects"
 T = 0.01
 QUIET = {"push.force": 0.0, "robot.jitter": 0.0, "robot.sensors.joint_velocity_noise": 0.0, "robot.sensors.switch_bounce": 0.0,
-         **{f"robot.{sensor}_{error}": 0.0
+         **{f"robot.sensors.{sensor}_{error}": 0.0
             for sensor in ("gyro", "accelerometer") for error in ("noise", "bias")}}  # fmt: skip
 
 
