@@ -7,7 +7,7 @@ which are stale.
     python lab/pages/study_data.py stale                           what has changed since, by data file; exit 1 if any
     python lab/pages/study_data.py mark                            write that below the tables
 
-A data file is ``docs/data/STUDY.json``. Its table stands in the pages of ``PAGES`` between ``<!-- data: STUDY -->`` and
+A data file is ``STUDY.json`` in ``docs/data``. Its table stands in the pages of ``PAGES`` between ``<!-- data: STUDY -->`` and
 ``<!-- end of data: STUDY -->``, and a test holds the two together. A table is stale if the files in ``measures`` of its data
 file have changed since its commit. ``older`` are tables that were made before there were data files: their commit is
 that of their last change.
@@ -140,9 +140,10 @@ def git(root: Path, *arguments: str) -> str:
 def changed_since(root: Path, commit: str, measures: Sequence[str]) -> list[str]:
     """Return the files below ``measures`` that differ between a commit and the files as they are, tests excepted."""
     names = git(root, "diff", "--name-only", commit, "--", *measures).splitlines()
-    return [
+    found = [
         name for name in names if name.endswith((".py", ".yaml", ".xml")) and "/tests/" not in name
     ]
+    return sorted(found, key=lambda name: not (root / name).is_file())  # a page cites what is there
 
 
 def data_files(root: Path) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -63,7 +63,7 @@ def found_and_true(seed: int) -> tuple[Calibration, dict[str, object]]:
     drawn, pack = draw_variation(params, ROBOT), params.actuators.battery.of(ROBOT)
     factors = [drawn.joint_friction * each for each in drawn.friction_of_joint]
     return found, {
-        "place": drawn.imu.place, "angle": drawn.imu.to_axes,
+        "place": drawn.imu.position, "angle": drawn.imu.to_axes,
         "ages": reading_ages(params),
         "friction": np.array(factors) * ROBOT.motors.friction,
         "constants": list(oracle_values(graph)["robot.motor_model.torque_constant"].values()),
