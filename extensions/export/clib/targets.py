@@ -52,8 +52,45 @@ TARGETS: dict[str, Target] = {
 }  # fmt: skip
 
 
+WIDE_PRODUCT = """
+define void @__multi3(ptr %out, i64 %al, i64 %ah, i64 %bl, i64 %bh) noinline optnone {
+  %a0 = and i64 %al, 4294967295
+  %a1 = lshr i64 %al, 32
+  %b0 = and i64 %bl, 4294967295
+  %b1 = lshr i64 %bl, 32
+  %w0 = mul i64 %a0, %b0
+  %c0 = lshr i64 %w0, 32
+  %p1 = mul i64 %a1, %b0
+  %t1 = add i64 %p1, %c0
+  %t1l = and i64 %t1, 4294967295
+  %t1h = lshr i64 %t1, 32
+  %p2 = mul i64 %a0, %b1
+  %t2 = add i64 %p2, %t1l
+  %t2h = lshr i64 %t2, 32
+  %s2 = shl i64 %t2, 32
+  %w0l = and i64 %w0, 4294967295
+  %low = or i64 %s2, %w0l
+  %p3 = mul i64 %a1, %b1
+  %h1 = add i64 %p3, %t1h
+  %h2 = add i64 %h1, %t2h
+  %x1 = mul i64 %ah, %bl
+  %x2 = mul i64 %al, %bh
+  %h3 = add i64 %h2, %x1
+  %high = add i64 %h3, %x2
+  store i64 %low, ptr %out
+  %above = getelementptr i64, ptr %out, i32 1
+  store i64 %high, ptr %above
+  ret void
+}
+"""
+"""The product of whole numbers of 128 bits, which LLVM asks for where it checks one of 64 bits and WebAssembly has no
+instruction for it. Other systems have it in their compiler's library."""
+
+
 def compile_module(text: str, target: Target) -> bytes:
     """Return the object file of a module for a kind of processor."""
+    if target.triple.startswith("wasm"):
+        text += WIDE_PRODUCT
     return cross_compiled(text, target.triple, OLDEST[target.triple], target.features)
 
 

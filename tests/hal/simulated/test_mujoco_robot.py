@@ -247,8 +247,8 @@ def digest(seed: int) -> str:
 @pytest.mark.long
 def test_same_seed_same_bytes_in_every_process_on_every_cpu() -> None:
     code = (
-        f"import sys; sys.path.insert(0, {str(Path(__file__).parents[1])!r})\n"
-        "from simulated.test_mujoco_robot import digest\nprint(digest(11))"
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parents[3])!r})\n"
+        "from tests.hal.simulated.test_mujoco_robot import digest\nprint(digest(11))"
     )
     others = {
         subprocess.run(
