@@ -107,7 +107,7 @@ def docs_script() -> Callable[[str], ModuleType]:
     """Imports a script of lab/pages/ by its name; it finds the other scripts beside it."""
 
     def imported(name: str) -> ModuleType:
-        path = ROOT / "lab" / "pages" / f"{name}.py"
+        path = ROOT / f"{name if '/' in name else f'lab/pages/{name}'}.py"
         spec = importlib.util.spec_from_file_location(path.stem, path)
         assert spec is not None and spec.loader is not None
         module = importlib.util.module_from_spec(spec)

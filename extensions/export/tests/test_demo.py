@@ -36,7 +36,7 @@ class Quiet(SimpleHTTPRequestHandler):
 
 @pytest.fixture(scope="module")
 def world(docs_script: Callable[[str], ModuleType]) -> ModuleType:
-    return docs_script("demo/world")
+    return docs_script("extensions/export/demo/world")
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def page(
     if PROGRAM is None or shutil.which("npm") is None or shutil.which("wasm-ld") is None:
         pytest.skip("needs Chromium, npm and wasm-ld")
     folder = tmp_path_factory.mktemp("demo")
-    docs_script("demo/build").build(folder, ["push"], SEEDS)
+    docs_script("extensions/export/demo/build").build(folder, ["push"], SEEDS)
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=folder))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     with Browser(tmp_path_factory.mktemp("chromium"), (1280, 800)) as browser:
