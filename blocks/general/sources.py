@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, Literal
 
+from pydantic import field_validator
+
 from ...mathematics.elementary import expm1, log, sin
 from ...mathematics.kernel import kernel
 from ...mathematics.ticks import first_tick, in_ticks, since_begin
@@ -161,6 +163,13 @@ class SineWave(UnitFromParameters, Block):
         frequency: ScalarOrVector = live_parameter(1.0, unit="Hz", text="oscillations per second")
         phase: ScalarOrVector = live_parameter(0.0, unit="rad", text="angle at time zero")
         offset: ScalarOrVector = live_parameter(0.0, text="the mean")
+
+        @field_validator("frequency")
+        @classmethod
+        def _check_frequency(cls, value: ScalarOrVector) -> ScalarOrVector:
+            if min(value if isinstance(value, list) else [value]) < 0.0:
+                raise ValueError("expected frequencies of zero or more")
+            return value
 
     params: Params
     y = Output(Vector, text="the sine")

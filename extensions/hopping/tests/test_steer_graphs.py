@@ -13,6 +13,7 @@ from aloft.lab.benchmarks.courses import course
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
 from aloft.mathematics.rotations import to_matrix
+from aloft.planner.library.library import shipped_folder
 from aloft.runtime.loading import checked_file
 from aloft.runtime.loading.reading.files import graph_path
 from aloft.runtime.placement.placed import spread
@@ -48,7 +49,7 @@ def test_a_target_that_changes_shortly_before_lift_off_is_reached() -> None:
 @pytest.mark.long
 def test_the_estimated_tilt_does_not_drift_from_jump_to_jump() -> None:
     """An estimator that corrects the tilt only while the robot stands still was 10 mrad off before the fifth jump."""
-    graphs, seed = GRAPH.parent, 35102
+    graphs, seed = shipped_folder(), 35102
     sets = {"robot.seed": seed, "commands.commands": course(seed)[:4], "duration": 7.2}
     graph = load_cell(GRAPH, [graphs / "trials/robust.yaml"], sets, graphs / "bench.yaml")
     with graph.open() as stepped:
@@ -80,7 +81,7 @@ def hash_of(seed: int) -> str:
     """The run hash of the beginning of a course."""
     graph = checked_file(GRAPH, overrides={"robot.seed": seed})
     result = run(graph, TICKS)
-    assert result.signal("planner.part.number")[-1] == 1
+    assert result.signal("planner.segment.number")[-1] == 1
     return result.run_hash
 
 

@@ -29,7 +29,8 @@ def test_any_robot_is_steered_once_its_hops_are_planned(
     file.write_text("- {ahead: 6 cm, turn: 10 deg}\n")
     command = ("steer", "--robot", "go2", "--commands", str(file), "--no-record")
     assert (
-        "no stored plans of hops for go2" in run_here("check", "aloft:robots/steer", code=2).stderr
+        "no stored plans of hops for go2"
+        in run_here("check", "aloft:hopping/robots/steer", code=2).stderr
     )
     done = run_for_json(*command)
     assert done["metrics"]["jumps"] == 1 and done["metrics"]["plans_planned"] == 1
