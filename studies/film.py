@@ -74,7 +74,7 @@ class Plots:
             draw_panels(list(zip(axes, panels, strict=True)))
             self._image = image(figure)
         self._areas = [
-            (each.get_windowextent(), each.get_xlim()) for each in axes
+            (each.get_window_extent(), each.get_xlim()) for each in axes
         ]  # in pixels from below, and the times of its sides
 
     def picture(self, instant: float) -> Pixels:

@@ -13,6 +13,7 @@ from aloft.blocks.signals import PhaseState, RobotTruth, WholeBodyCommand
 from aloft.hal.simulated import external_forces
 from aloft.mathematics import elementwise
 from aloft.mathematics.body_dynamics import BodyMotion, body_motion, composite_inertias
+from aloft.mathematics.compiling import numpy_numbers
 from aloft.mathematics.compiling.arguments import record_type
 from aloft.mathematics.compiling.kernel_registry import arguments_of, is_kernel
 from aloft.mathematics.landing_law import LandingCost, flight_map
@@ -481,6 +482,15 @@ UNUSED = {
     "aloft.mathematics.rotations.to_euler": (np.array([0.1, 0.2, 0.3, 0.92]), np.zeros(3)),
 }  # fmt: skip
 """Arguments of kernels that ``graphs/jump.yaml`` does not call with either estimator."""
+UNUSED |= {
+    f"{each.__module__}.{each.__name__}": tuple([0.4, 0.7, 0.9][: len(arguments_of(each))])
+    for each in vars(numpy_numbers).values()
+    if is_kernel(each) and each.__module__ == numpy_numbers.__name__
+}
+UNUSED["aloft.blocks.scoring.estimator_score.heading"] = (np.array([0.1, 0.2, 0.3, 0.92]),)
+UNUSED["aloft.hal.simulated.physics_step.begin_flight_step"] = (
+    np.zeros(1), np.zeros(1, np.int64), np.ones(1, np.int64),
+)  # fmt: skip
 UNUSED |= {
     f"{each.__module__}.{each.__name__}": tuple(
         0.7 if each.__annotations__[name] == "float" else NORMAL(4) for name in arguments_of(each)

@@ -49,6 +49,18 @@ ROOMS = (
 HOT = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool", *vars(arrays)} - {"Any"}
 NOT_HOT = {
+    "blocks.estimation.gross_errors.gravity_looks_like": "for the text of a fault, once",
+    "blocks.estimation.gross_errors.looks_like": "for the text of a fault, once",
+    "blocks.estimation.gross_errors.vector_text": "for the text of a fault, once",
+    "blocks.general.table_playback._sides": "before a run, when the table is read",
+    "hal.log.columns.at_times": "before a run, when the log is read",
+    "hal.log.columns.mean_over": "before a run, when the log is read",
+    "hal.log.columns.repeats_of": "before a run, when the log is read",
+    "hal.log.columns.with_hysteresis": "before a run, when the log is read",
+    "hal.log.played_log.quaternion_of_rpy": "before a run, when the log is read",
+    "hal.log.played_log.rotation_of": "before a run, when the log is read",
+    "hal.log.played_log.rotation_of_rpy": "before a run, when the log is read",
+    "mathematics.quadratic_program._sparse": "for solvers of other packages, in plain Python",
     "mathematics.ticks.all_in_ticks": "of a table, in setup",
     "blocks.signals.robot.drive_conditions": "of an error byte, for people",
     "blocks.signals.robot.describe_conditions": "of an error byte, for people",
@@ -325,7 +337,9 @@ def is_exact(function):
     names = written_code(function).co_names
     callees = [function.__globals__.get(name) for name in names]
     marked = {id(f) for f in kernels().values()}
-    return not INEXACT & set(names) and all(is_exact(f) for f in callees if id(f) in marked)
+    return not INEXACT & set(names) and all(
+        is_exact(f) for f in callees if id(f) in marked and f is not function
+    )
 
 
 def replaced(arguments, random):

@@ -81,7 +81,7 @@ def block_name(block_type: type[Block]) -> str:
     if module.startswith(f"{_OURS}.") and package in PACKAGES:
         return f"{package}.{block_type.__name__}"
     for each in extensions():
-        if module.startswith(f"{each.package}."):
+        if each.name != "lab" and module.startswith(f"{each.package}."):
             return f"{each.name}.{block_type.__name__}"
     return f"{module.partition('@')[0]}:{block_type.__name__}"
 

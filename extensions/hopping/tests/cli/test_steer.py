@@ -23,7 +23,7 @@ def test_any_robot_is_steered_once_its_hops_are_planned(
 ) -> None:
     """With Go2 as if none of its hops shipped, and few of them."""
     monkeypatch.setattr(hop_plans, "SHIPPED", tmp_path)
-    monkeypatch.setattr(hop_plans, "user_folder", lambda: tmp_path / "own")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "own"))
     monkeypatch.setattr(make_samples, "COUNT", 16)
     file = tmp_path / "course.yaml"
     file.write_text("- {ahead: 6 cm, turn: 10 deg}\n")
@@ -35,7 +35,7 @@ def test_any_robot_is_steered_once_its_hops_are_planned(
     done = run_for_json(*command)
     assert done["metrics"]["jumps"] == 1 and done["metrics"]["plans_planned"] == 1
     assert done["metrics"]["worst_place_error_m"] < 0.03
-    (kept,) = (tmp_path / "own" / "hops").glob("go2-*/level.npz")
+    (kept,) = (tmp_path / "own").rglob("hops/go2-*/level.npz")
     written = kept.stat().st_mtime_ns
     assert run_for_json(*command)["run_hash"] == done["run_hash"]
     assert kept.stat().st_mtime_ns == written
