@@ -199,7 +199,9 @@ def merge(
     as_json: AsJson = False,
 ) -> None:
     """Put the recordings of a run's parts, made on several machines, together into one."""
+    from ..files.problems import LoadError
     from ..logs.recording.merged_run import (
+        check_all_machines,
         joined_blocks,
         machine_of,
         merge_recordings,
@@ -216,7 +218,11 @@ def merge(
         blocks = joined_blocks(list(runs.values()))
         header = replace(opened.file.header, blocks=blocks)
         whole = replace(opened, file=replace(opened.file, header=header))
-        placed = split_over_machines(whole.graph)
+        try:
+            placed = split_over_machines(whole.graph)
+        except LoadError:
+            check_all_machines(runs)  # nothing is known of the blocks of a part without a recording
+            raise
         paths: dict[str, Path] = {}
         for file, run in runs.items():
             machine = machine_of(placed, run)

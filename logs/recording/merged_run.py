@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+import yaml
 
 from ...runtime.language.errors import AloftError, ExitCode
 from ...runtime.links.lockstep_link import LinkInput
@@ -47,6 +48,37 @@ def machine_of(placed: PlacedGraph, part: RecordedRun) -> str:
         if mine and all(path in own for path in mine):
             return machine.name
     raise AloftError(f"{part.path} is not the recording of one part of {placed.graph.name}")
+
+
+def recorded_machines(run: RecordedRun) -> tuple[list[str], set[str]]:
+    """Return all machines of a recorded graph, and those one of whose blocks is in the recording itself."""
+    tree = yaml.load(run.header.graph, yaml.BaseLoader)  # in which the key `on` is a text
+    machines = list(tree.get("machines", {}))
+    own = {block.path for block in run.header.blocks if _STAND_IN not in block.type}
+    there = {
+        entry.get("on", machines[0])
+        for path, entry in tree.get("blocks", {}).items()
+        if machines and path in own and isinstance(entry, dict)
+    }
+    return machines, there
+
+
+def check_all_machines(runs: Mapping[Path, RecordedRun]) -> None:
+    """Refuse recordings of two parts of one machine, and recordings that are not all parts of a graph.
+
+    Raises:
+        AloftError: which are twice, or missing.
+    """
+    found: dict[str, Path] = {}
+    machines: list[str] = []
+    for file, run in runs.items():
+        machines, there = recorded_machines(run)
+        for name in there:
+            if name in found:
+                raise AloftError(f"{found[name]} and {file} are both of machine {name!r}")
+            found[name] = file
+    if missing := [name for name in machines if name not in found]:
+        raise AloftError(f"the recordings of {', '.join(missing)} are missing")
 
 
 def merged_outcome(

@@ -142,7 +142,7 @@ def _in_chain(description: dict[str, object], frames: list[tuple[str, int, str]]
     """Return the path of the block that a chain runs, if the innermost frame is a chain's."""
     order, shared = description["order"], int(sys.argv[5])
     assert isinstance(order, list)
-    if shared < 0 or not frames or frames[0][2] != "run" or "chain.py" not in frames[0][0]:
+    if shared < 0 or not frames or frames[0][2] != "run" or "call_sequence.py" not in frames[0][0]:
         return []
     place = int.from_bytes(os.pread(shared, 8, 0), sys.byteorder, signed=True)
     return order[place : place + 1] if place >= 0 else []
