@@ -23,7 +23,11 @@ and functions that a start makes and that all stay. A check of a jump makes 100 
 
 def main() -> None:
     """Run the command line and leave with one of ``ExitCode``."""
-    pages = ([], ["--help"], ["--version"])  # these import neither Typer nor a verb
+    pages: tuple[list[str], ...] = (
+        [],
+        ["--help"],
+        ["--version"],
+    )  # these import neither Typer nor a verb
     if sys.argv[1:] in pages and "_ALOFT_COMPLETE" not in os.environ:
         _print_page()
         sys.exit(0)
