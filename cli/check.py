@@ -42,16 +42,12 @@ def check(
         raise typer.BadParameter("a graph file is needed, or --schema")
     with errors_reported(as_json):
         checked = checked_file(graph, overrides or [])
-        if any(not spec.block_type.__module__.startswith(OWN) for spec in checked.blocks):
-            check_users_blocks(checked)
-    warnings: list[str] = []
+        users = any(not spec.block_type.__module__.startswith(OWN) for spec in checked.blocks)
+        warnings = check_users_blocks(checked) if users else []
     if checked.machines:
         from ..runtime.transports.registry import open_endpoints
 
-        warnings = open_endpoints(checked.machines)
-    from ..runtime.running.block_mistakes import tied_to_machine
-
-    warnings += tied_to_machine(checked)
+        warnings += open_endpoints(checked.machines)
     if sum(spec.block_type.__name__ == "Integrator" for spec in checked.blocks) > 1:
         from ..runtime.running.euler_rings import growing_rings
 
@@ -76,17 +72,19 @@ def check(
         typer.echo(f"{graph}: no problems; {count} blocks at {checked.base_rate:g} Hz{spread}")
 
 
-def check_users_blocks(graph: CheckedGraph) -> None:
-    """Set up the users' blocks of a graph alone, which finds mistakes in their kernels and in ``setup``.
+def check_users_blocks(graph: CheckedGraph) -> list[str]:
+    """Set up the users' blocks of a graph alone, which finds mistakes in their kernels and in ``setup``; return
+    warnings of what ties their bits to this machine.
 
     Raises:
         KernelMistake: a block has one.
     """
-    from ..runtime.running.block_mistakes import mistakes_of
+    from ..runtime.running.block_mistakes import mistakes_of, tied_to_machine
     from ..runtime.running.kernel_checks import KernelMistake
 
     if mistakes := mistakes_of(graph):
         raise KernelMistake("\n".join(mistakes.values()), block=next(iter(mistakes)))
+    return list(tied_to_machine(graph))
 
 
 def doctor(

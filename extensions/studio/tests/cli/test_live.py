@@ -69,8 +69,14 @@ def test_both_parts_of_a_local_run_are_shown_tuned_and_followed(here: Path) -> N
         assert isinstance(run, SpreadRun)
         wait_for(run, lambda f: f["state"] == "running" and "twice" in f["times"])
         run.close()
-        run = open_live_run("", RemoteRunAddress(here))  # now that a part answers here
-        assert isinstance(run, SpreadRun) and run.has_parameters
+        for _ in range(80):  # until a part answers here
+            run = open_live_run("", RemoteRunAddress(here))
+            assert isinstance(run, SpreadRun)
+            if run.has_parameters:
+                break
+            run.close()
+            time.sleep(0.25)
+        assert run.has_parameters
         run.close()
         run = open_live_run("waves-near")
         assert isinstance(run, SpreadRun) and run.has_parameters
