@@ -15,7 +15,7 @@ def test_drawn_kernels_are_numpys(tmp_path, monkeypatch) -> None:
 
 
 @pytest.mark.xfail(
-    reason="np.dot of reversed slices within max() ends with a TypeError, not with a refusal: docs/known_gaps.md"
+    reason="ends of slices beyond an array, and np.dot of reversed slices within max(): docs/known_gaps.md"
 )
 @pytest.mark.long
 def test_more_drawn_kernels_are_numpys_and_numbas(tmp_path, monkeypatch) -> None:
