@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ....logs.viewing.signal_names import value_text
 from ....runtime.language.layout import Layout
+from ....runtime.language.quantities import Quantity
 from ....runtime.language.stages import CheckedGraph
 from ....runtime.live.window import WindowContents
 
@@ -38,8 +39,8 @@ class ValueTexts:
             for port, output in spec.block_type.outputs.items():
                 for name, field in output.signal.fields.items():
                     quantity = spec.quantities.get(f"{port}.{name}")
-                    unit = quantity.unit if quantity is not None else field.unit
-                    text = "" if unit is None or str(unit) == "1" else str(unit)
+                    quantity = quantity or Quantity(field.unit)
+                    text = "" if quantity.unit_text == "1" else quantity.unit_text
                     names = {int(value): value.name.lower() for value in field.values or ()}
                     self._fields.append(_Field(f"{spec.path}.{port}", name, text, names))
 
