@@ -13,6 +13,7 @@ from ....logs.file.format import RecordedField
 from ....logs.viewing.signal_names import element_names, value_text
 from ....runtime.language.errors import AloftError
 from ....runtime.language.layout import Layout
+from ....runtime.language.quantities import Quantity
 from ....runtime.language.stages import CheckedGraph
 from ....runtime.live.window import WindowContents
 
@@ -43,7 +44,7 @@ class ValueTexts:
             for port, output in spec.block_type.outputs.items():
                 for name, field in output.signal.fields.items():
                     quantity = spec.quantities.get(f"{port}.{name}")
-                    unit = quantity.unit if quantity is not None else field.unit
+                    quantity = quantity or Quantity(field.unit, field.frame)
                     slot = layout.slots[f"{spec.path}.{port}.{name}"]
                     self._fields.append(
                         RecordedField(
@@ -52,8 +53,8 @@ class ValueTexts:
                             start=slot.start,
                             shape=slot.shape,
                             dimensions=field.shape,
-                            unit="" if unit is None or str(unit) == "1" else str(unit),
-                            frame=quantity.frame if quantity is not None else field.frame,
+                            unit="" if quantity.unit_text == "1" else quantity.unit_text,
+                            frame=quantity.frame,
                             values={int(v): v.name.lower() for v in field.values or ()},
                         )
                     )

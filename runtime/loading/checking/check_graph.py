@@ -23,7 +23,7 @@ from ..flattening.rates import check_hyperperiod, read_offset, read_period
 from .background import move_to_background
 from .block_check import BlockDraft, check_defaults, check_emit, check_fit, check_sizes, lacks_robot
 from .composite_wires import resolve_composite_wires
-from .infer_units import infer_quantities, inferred_quantities, unchecked_wires
+from .infer_units import infer_quantities, inferred_quantities, questions, unchecked_wires
 from .infer_widths import Widths
 from .inserted import insert_constant, insert_delay, read_values
 from .link_settings import check_paths, check_watchdog, read_link_settings
@@ -382,5 +382,5 @@ def _assemble(
         clock=settings.clock,
         file=graph.file,
         overrides=graph.overrides,
-        unchecked=tuple(unchecked_wires(drafts)),
+        unchecked=(*unchecked_wires(drafts), *questions(drafts)),
     )
