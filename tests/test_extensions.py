@@ -22,7 +22,7 @@ from aloft.runtime.language.extensions import (
 )
 
 ROOT = Path(aloft.__file__).parent
-JUMP_HASH = "d899a365a3d5b2eb445d93941b896d03"
+JUMP_HASH = "c7b663b8a6f2cbe347a79f7dbb059c32"
 CHECK = """
 import json, sys
 from pathlib import Path

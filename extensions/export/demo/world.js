@@ -75,21 +75,23 @@ export class World {
     );
     const to = views(about.to), from = views(about.from);
     const out = () => { for (const [field, own] of from) own.set(this.data[field]); };
-    const library = {
-      step1: () => { mujoco.mj_step1(this.model, this.data); out(); },
-      step2: () => {
+    const simulate = ({ call, arguments: more, when }) => {
+      const wanted = when === null ? [1n] : new BigInt64Array(buffer, this.self + when, 1);
+      const made = mujoco[call];
+      return () => {
+        if (!wanted[0]) return;
         for (const [field, own] of to) this.data[field].set(own);
-        mujoco.mj_step2(this.model, this.data);
+        made(this.model, this.data, ...more);
         out();
-      },
+      };
     };
     const call = (each) => {
+      if (each.call) return simulate(each);
       if (typeof each !== "string") {
         const [kind, place, count] = each;
         const drawn = new Float64Array(buffer, this.self + place, count);
         return () => { for (let k = 0; k < count; k += 1) drawn[k] = this.draws[kind](); };
       }
-      if (library[each]) return library[each];
       const made = code[`${name}_${each}`];
       return () => { if (made(this.self) !== 0) throw new Error(`${each} divides by zero`); };
     };
