@@ -22,7 +22,7 @@ from aloft.runtime.language.extensions import (
 )
 
 ROOT = Path(aloft.__file__).parent
-JUMP_HASH = "c7b663b8a6f2cbe347a79f7dbb059c32"
+JUMP_HASH = "b17451f3d8c225c8437d3a0c6ec34667"
 CHECK = """
 import json, sys
 from pathlib import Path

@@ -58,8 +58,8 @@ export class World {
     const words = new BigInt64Array(buffer, this.self, size / 8);
     for (const [place, word] of robot.words) words[place] = BigInt(word);
 
-    this.model = mujoco.MjModel.from_xml_string(about.xml);
-    for (const [field, values] of Object.entries(robot.model)) this.model[field].set(values);
+    this.models = [];
+    this.model = this.modelWith(robot);
     this.data = new mujoco.MjData(this.model);
     const integration = mujoco.mjtState.mjSTATE_INTEGRATION.value;
     mujoco.mj_setState(this.model, this.data, robot.state, integration);
@@ -75,13 +75,14 @@ export class World {
     );
     const to = views(about.to), from = views(about.from);
     const out = () => { for (const [field, own] of from) own.set(this.data[field]); };
-    const simulate = ({ call, arguments: more, when }) => {
+    const simulate = ({ call, flags, arguments: more, when }) => {
+      const model = this.modelWith(robot, flags);
       const wanted = when === null ? [1n] : new BigInt64Array(buffer, this.self + when, 1);
       const made = mujoco[call];
       return () => {
         if (!wanted[0]) return;
         for (const [field, own] of to) this.data[field].set(own);
-        made(this.model, this.data, ...more);
+        made(model, this.data, ...more);
         out();
       };
     };
@@ -99,6 +100,17 @@ export class World {
       Object.entries(about.programs).map(([key, program]) => [key, program.map(call)]),
     );
     out();
+  }
+
+  /** The robot's model, without what `flags` leave out. */
+  modelWith(robot, flags = null) {
+    const known = this.models.find((each) => flags === each.opt.disableflags);
+    if (known) return known;
+    const model = this.mujoco.MjModel.from_xml_string(this.about.xml);
+    for (const [field, values] of Object.entries(robot.model)) model[field].set(values);
+    if (flags !== null) model.opt.disableflags = flags;
+    this.models.push(model);
+    return model;
   }
 
   run(program) { for (const call of this.programs[program]) call(); }
@@ -130,5 +142,5 @@ export class World {
     return text;
   }
 
-  free() { this.data.delete(); this.model.delete(); }
+  free() { this.data.delete(); for (const model of this.models) model.delete(); }
 }

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from mujoco import MjModel
 from numpy.typing import NDArray
 
 from aloft.extensions.export.clib.cut import Cut
@@ -56,8 +57,9 @@ the graph."""
 
 class World(NamedTuple):
     """A graph whose robot, drawn by a seed, stands, and its module; ``programs`` are the calls of the robot
-    in a tick: functions of the module, functions of the simulator ``{call, arguments, when}``, and draws ``[kind, place,
-    count]``. ``when`` is the place of a word that leaves the call out where it is zero."""
+    in a tick: functions of the module, functions of the simulator ``{call, flags, arguments, when}``, and draws
+    ``[kind, place, count]``. ``flags`` say what the model of the call leaves out, and ``when`` is the place of a
+    word that leaves the call out where it is zero."""
 
     bound: BoundGraph
     module: Module
@@ -115,7 +117,7 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
     data = plant.data
     visible = [getattr(data, field) for field in (*TO_MUJOCO, *FROM_MUJOCO)]
     foreign = [c for program in programs.values() for c in program if isinstance(c, ForeignCall)]
-    steps = {id(call) for call in foreign if _of_simulator(call, plant)}
+    steps = {id(call) for call in foreign if _of_simulator(call)}
     drawing = [call for call in foreign if id(call) not in steps]
     if not all(call.words[3] for call in drawing):  # the address of what is drawn
         raise NeedsPython([f"{graph.file}: block 'robot' calls Python in a step of its simulator"])
@@ -135,7 +137,9 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
             return each
         if id(each) in steps:
             when = None if each.when is None else module.image.place(each.when)[1]
-            return {"call": each.run.func.__name__, "arguments": each.run.args[2:], "when": when}
+            model, _, *more = each.run.args
+            flags = model.opt.disableflags
+            return {"call": each.run.func.__name__, "flags": flags, "arguments": more, "when": when}
         kind = "normal" if isinstance(each.run, partial) else "uniform"  # of `random_streams`
         array = draws[id(each)]
         return [kind, module.image.place(array)[1], array.size]
@@ -155,10 +159,13 @@ def _array(bound: BoundGraph, place: str) -> NDArray[Any]:
     return np.asarray(found)
 
 
-def _of_simulator(call: ForeignCall, plant: Plant) -> bool:
-    """Say whether a call is one of MuJoCo's functions of the model and its data."""
-    run = call.run
-    return isinstance(run, partial) and len(run.args) > 1 and run.args[0] is plant.model
+def _of_simulator(call: ForeignCall) -> bool:
+    """Say whether a call is one of MuJoCo's functions of a model and its data."""
+    return (
+        isinstance(call.run, partial)
+        and len(call.run.args) > 1
+        and isinstance(call.run.args[0], MjModel)
+    )
 
 
 def _drawn(call: ForeignCall) -> NDArray[np.float64]:
