@@ -84,7 +84,8 @@ class InitialValueParameters(VectorParameters):
     """The parameters of blocks that start from a vector."""
 
     initial: ScalarOrVector = parameter(
-        0.0, text="the first output: n numbers, or one for all elements"
+        0.0,
+        text="the first output: n numbers, or one for all elements; of a quaternion the identity where it is not given",
     )
 
     def start_value(self) -> NDArray[np.float64]:
