@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...plotting import Curve, Panel, panels_svg, save_panels
+from ..language.quantities import Quantity
 from ..language.selection import Selection, read_selection, select
 from ..language.signals import Field
 from ..language.stages import BlockSpec, CheckedGraph
@@ -111,8 +112,8 @@ def _declared(
     if graph is None or spec is None or field is None:
         return "", numbers, ()
     quantity = spec.quantities.get(rest)
-    unit = quantity.unit if quantity is not None else field.unit
-    text = "" if unit is None or str(unit) == "1" else str(unit)
+    quantity = quantity or Quantity(field.unit)
+    text = "" if quantity.unit_text == "1" else quantity.unit_text
     if graph.robot is not None and field.shape == ("n_joints",):
         joints = tuple(joint.name for joint in graph.robot.joints)
         return text, list(joints), joints
