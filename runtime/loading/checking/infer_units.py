@@ -188,11 +188,29 @@ def unchecked_wires(drafts: Mapping[str, BlockDraft]) -> Iterator[str]:
                 continue
             for field_name, field in draft.inputs[name].signal.fields.items():
                 arrives = quantity_at_input(drafts, draft, name, field_name)
-                if field.unit is not None and arrives is not None and arrives.unit is None:
+                if field.unit is None or arrives is None:
+                    continue
+                if None in arrives.units(1):
                     yield (
                         f"{wire.shown or wire.source} does not say its unit, and {path}.{name} reads "
                         f"{field_name} in {Quantity(field.unit)}"
                     )
+
+
+def questions(drafts: Mapping[str, BlockDraft]) -> Iterator[str]:
+    """Yield a text for every input that joins unlike units where its block takes them for one."""
+    for path, draft in drafts.items():
+        quantities = {
+            f"{name}.{field_name}": arrives
+            for name, port in draft.inputs.items()
+            for field_name in port.signal.fields
+            if (arrives := quantity_at_input(drafts, draft, name, field_name)) is not None
+        }
+        if any(quantity.elements for quantity in quantities.values()):
+            inputs = InputQuantities(quantities)
+            inferred_outputs(draft, inputs)
+            for name, fix in inputs.questions:
+                yield f"{path}.{name.partition('.')[0]} joins {quantities[name]} in one vector: {fix}"
 
 
 def inferred_outputs(draft: BlockDraft, inputs: InputQuantities) -> Answers:
@@ -267,7 +285,7 @@ def _check(
 
 
 def _units_differ(a: Quantity, b: Quantity) -> bool:
-    return a.unit is not None and b.unit is not None and not a.unit.matches(b.unit)
+    return not a.units_agree(b)
 
 
 def _named(quantity: Quantity) -> str:
@@ -278,6 +296,8 @@ def _named(quantity: Quantity) -> str:
 
 
 def _conversion(found: Quantity, expected: Quantity) -> str:
+    if found.elements or expected.elements:
+        return ""
     if found.unit is None or expected.unit is None or found.unit.matches(expected.unit):
         return f"turn it into {expected.frame} with blocks.RotateVector" if expected.frame else ""
     if found.unit.same_dimension(expected.unit):
