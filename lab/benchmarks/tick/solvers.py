@@ -73,9 +73,7 @@ def solvers(ticks: int | None = None) -> list[Row]:
     own = cases[OWN]
     times = {name: np.array(case.times)[own.stands] for name, case in cases.items()}
     rows = [Row(OWN, float(np.median(times[OWN])), "us/tick", note=f"{own.stands.sum()} ticks")]
-    rows += [
-        compare(name, times, OWN, note=agreement_note(own, cases[name])) for name in names[1:]
-    ]
+    rows += [compare(name, times, OWN, note=agreement_note(own, cases[name])) for name in names[1:]]
     for name, package in PACKAGES.items():
         if name not in installed:
             note = f"not installed: pip install {package}"
