@@ -163,8 +163,8 @@ def _field(spec: BlockSpec, port: str, name: str) -> str:
     shape = field.resolve(spec.dimensions)
     numbers = f"[{', '.join(map(str, shape))}]" if shape else ""
     quantity = spec.quantities.get(f"{port}.{name}", Quantity(field.unit, field.frame))
-    unit = f" {quantity.unit}" if quantity.unit is not None else ""
-    if field.inferred and quantity.unit is None:
+    unit = f" {quantity.unit_text}" if quantity.unit_text else ""
+    if field.inferred and not unit:
         unit = " unit not checked"
     frame = f" in {quantity.frame}" if quantity.frame else ""
     return f"{name}: {field.dtype_name}{numbers}{unit}{frame}"
