@@ -23,7 +23,6 @@ from aloft.runtime.loading import checked_file, checked_text
 
 from .test_layers import NAMES, diagram_of
 
-
 COMPOSED = """
 rate: 1 kHz
 blocks:
