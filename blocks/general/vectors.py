@@ -84,7 +84,8 @@ class InitialValueParameters(VectorParameters):
     """The parameters of blocks that start from a vector."""
 
     initial: ScalarOrVector = parameter(
-        0.0, text="the first output: n numbers, or one for all elements"
+        0.0,
+        text="the first output: n numbers, or one for all elements; of a quaternion the identity where it is not given",
     )
 
     def start_value(self) -> NDArray[np.float64]:
@@ -151,6 +152,10 @@ class InUnit(Parameters):
     in_unit: ClassVar[tuple[str, ...]] = ()
 
     unit: UnitText = parameter("", text="unit of the numbers; nothing for plain ones")
+
+    def own_unit(self, name: str) -> str:
+        """Return ``unit`` for the numbers that are in it."""
+        return self.unit if name in self.in_unit else ""
 
     @model_validator(mode="before")
     @classmethod

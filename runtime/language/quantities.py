@@ -20,12 +20,14 @@ class Quantity:
     """A unit and a frame. ``unit`` is ``None`` where it is not checked; ``frame`` is ``None`` where
     a frame has no meaning, or is not checked.
 
-    A vector whose elements have unlike units has them in ``elements``, and no ``unit``.
+    A vector whose elements have unlike units has them in ``elements``, and no ``unit``. ``quaternion`` says
+    that the last axis is a unit quaternion x, y, z, w.
     """
 
     unit: Unit | None = ONE
     frame: str | None = None
     elements: tuple[Unit | None, ...] = ()
+    quaternion: bool = False
 
     @classmethod
     def of(cls, units: Iterable[Unit | None], frame: str | None = None) -> Quantity:
@@ -90,7 +92,9 @@ UNCHECKED = Quantity(None)
 def quantity_of(field: Field) -> Quantity | None:
     """Return the quantity that a field declares; ``None`` for one that carries whatever is
     wired."""
-    return None if field.inferred else Quantity(field.unit, field.frame)
+    return (
+        None if field.inferred else Quantity(field.unit, field.frame, quaternion=field.quaternion)
+    )
 
 
 @dataclass(frozen=True)
