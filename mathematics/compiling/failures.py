@@ -13,8 +13,8 @@ class Failure(IntEnum):
     TOO_LARGE = 1
     DOMAIN = 2
     RANGE = 3
-    NUMBA = 4
-    SLICE = 5
+    SLICE = 4
+    NUMBA = 5
 
 
 FAILURES: dict[Failure, tuple[type[Exception], str]] = {

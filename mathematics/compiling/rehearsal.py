@@ -180,7 +180,7 @@ def _place_of(error: Exception | None, file: str) -> str:
     place, frame = file, error.__traceback__ if error is not None else None
     while frame is not None:
         name = frame.tb_frame.f_code.co_filename
-        if "rehearsal" not in name:
+        if not name.endswith(("compiling/rehearsal.py", "compiling/numpy_numbers.py")):
             place = f"{name}:{frame.tb_lineno}"
         frame = frame.tb_next
     return place

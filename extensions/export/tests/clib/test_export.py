@@ -369,6 +369,60 @@ def test_what_a_block_asks_of_python_is_a_status_with_its_name(tmp_path: Path) -
     ]
 
 
+FAILING = """\
+import math
+import numpy as np
+from aloft import Block, Input, Output, kernel
+from aloft.blocks.general.vectors import Vector, VectorParameters
+
+
+class Failing(Block):
+    "Fails in the way that a number says."
+
+    class Params(VectorParameters):
+        pass
+
+    params: Params
+    u = Input(Vector, text="the way")
+    y = Output(Vector, text="numbers")
+
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector) -> None:
+        way = int(u.value[0])
+        if way == 1:
+            y.value[0] = 1.0 / (u.value[0] - 1.0)
+        if way == 2:
+            y.value[0] = (way << 61) * way
+        if way == 3:
+            y.value[0] = math.sqrt(-u.value[0])
+        if way == 4:
+            y.value[0] = math.exp(1000.0 * u.value[0])
+        t = np.zeros(2)
+        y.value[0] = t @ np.ones(6)[way : way + 2]
+"""
+
+
+@needs_compiler
+def test_a_block_that_fails_says_why(tmp_path: Path) -> None:
+    (tmp_path / "failing_block.py").write_text(FAILING)
+    (tmp_path / "failing.yaml").write_text(
+        "rate: 100 Hz\nblocks:\n  given: {use: blocks.External}\n"
+        '  failing: {use: "failing_block:Failing", in: {u: given.y}}\n'
+    )
+    made = write_library(
+        str(tmp_path / "failing.yaml"), tmp_path / "failing", outputs=["failing.y"]
+    )
+    library = SharedLibrary(made.description)
+    found = []
+    for way in (0, 1, 2, 3, 4, 5):
+        library.reset()
+        library.inputs["given"][...] = way
+        found.append((Status(library.step()).name, library.last_block()))
+    names = ("DIVIDED_BY_ZERO", "TOO_LARGE", "OUT_OF_DOMAIN", "OUT_OF_RANGE", "WRONG_LENGTH")
+    assert found == [("OK", ""), *((name, "failing") for name in names)]
+
+
 def test_blocks_that_need_python_are_named_all_at_once(tmp_path: Path) -> None:
     (tmp_path / "noisy.yaml").write_text(
         "rate: 100 Hz\nblocks:\n"
