@@ -153,6 +153,10 @@ class InUnit(Parameters):
 
     unit: UnitText = parameter("", text="unit of the numbers; nothing for plain ones")
 
+    def own_unit(self, name: str) -> str:
+        """Return ``unit`` for the numbers that are in it."""
+        return self.unit if name in self.in_unit else ""
+
     @model_validator(mode="before")
     @classmethod
     def _read_units(cls, data: Any) -> Any:

@@ -74,6 +74,7 @@ class Tunables:
         own_range = getattr(self._blocks[block].params, "live_range", None)
         if own_range is not None and kind in ("number", "numbers"):
             least, most = own_range(path.removeprefix(f"{block}.").partition(".")[0])
+            words = words or _in_words(least, most)
         low, high = _range(start if kind in ("number", "numbers") else None, least, most)
         text = info.description if info is not None and info.description else entry["text"]
         return {
@@ -97,9 +98,8 @@ class Tunables:
 
     def _own_unit(self, block: str, path: str) -> str:
         """Return the unit that a block's parameters share, where this is one of them."""
-        params: Any = self._blocks[block].params
         name = path.removeprefix(f"{block}.").partition(".")[0]
-        return str(params.unit) if name in getattr(params, "in_unit", ()) else ""
+        return self._blocks[block].params.own_unit(name)
 
     def _place(self, path: str) -> str:
         """Return the place where a parameter is written; of one that is not, its block's place."""
@@ -161,6 +161,12 @@ def _bounds(info: FieldInfo | None) -> tuple[float | None, float | None, str]:
             else:
                 most = float(bound)
     return least, most, ", ".join(dict.fromkeys(words))
+
+
+def _in_words(least: float | None, most: float | None) -> str:
+    """Return bounds as a page shows them."""
+    known = (("≥", least), ("≤", most))
+    return ", ".join(f"{sign} {bound:g}" for sign, bound in known if bound is not None)
 
 
 def _constraints(info: FieldInfo | None) -> Iterator[Any]:

@@ -16,6 +16,7 @@ from ....runtime.language.layout import Layout
 from ....runtime.language.quantities import Quantity
 from ....runtime.language.stages import CheckedGraph
 from ....runtime.live.window import WindowContents
+from ....runtime.running.lateness import duration
 
 FEW = 2
 """Numbers of a port that stand beside its wire."""
@@ -212,11 +213,3 @@ def tick_text(stamps: Sequence[NDArray[np.int64]], period: float) -> str:
     return (
         f"a tick takes {duration(median)} (longest {duration(longest)}) of {duration(period * 1e9)}"
     )
-
-
-def duration(nanoseconds: float) -> str:
-    """Format a duration with three digits and a unit that fits."""
-    for limit, scale, unit in ((1e6, 1e3, "µs"), (1e9, 1e6, "ms")):
-        if nanoseconds < 0.9995 * limit:
-            return f"{nanoseconds / scale:.3g} {unit}"
-    return f"{nanoseconds / 1e9:.3g} s"

@@ -7,7 +7,14 @@ from collections.abc import Iterator, Mapping
 
 from ....files.problems import Code, Problems
 from ...language.block import Block
-from ...language.quantities import UNCHECKED, InputQuantities, Quantity, quantity_of
+from ...language.flat_graph import FlatBlock
+from ...language.quantities import (
+    UNCHECKED,
+    Disagreement,
+    InputQuantities,
+    Quantity,
+    quantity_of,
+)
 from ...language.unit_algebra import over
 from .block_check import BlockDraft
 from .inserted import own_unit
@@ -29,7 +36,7 @@ def infer_quantities(drafts: Mapping[str, BlockDraft], problems: Problems) -> No
     for path, draft in drafts.items():
         if draft.block_type is not None and draft.params is not None:
             inputs, answers = inference.final.get(path) or inference.ask(draft)
-            _check(draft, inputs, answers, problems)
+            _check(drafts, draft, inputs, answers, problems)
 
 
 class _QuantityInference:
@@ -240,7 +247,11 @@ def inferred_outputs(draft: BlockDraft, inputs: InputQuantities) -> Answers:
 
 
 def _check(
-    draft: BlockDraft, inputs: InputQuantities, answers: Answers, problems: Problems
+    drafts: Mapping[str, BlockDraft],
+    draft: BlockDraft,
+    inputs: InputQuantities,
+    answers: Answers,
+    problems: Problems,
 ) -> None:
     """Report inputs of a block that disagree, or an output that contradicts what a ring assumed
     before."""
@@ -263,7 +274,8 @@ def _check(
             other_where=flat.wires[other].where if other in flat.wires else None,
             expected=_named(item.expected) if item.expected else "",
             found=_named(item.found),
-            fix=_conversion(item.found, item.expected) if item.expected else "",
+            fix=_unit_of_source(drafts, flat, item, other)
+            or (_conversion(item.found, item.expected) if item.expected else ""),
         )
     for name, answer in answers.items():
         known = draft.quantities.get(name)
@@ -282,6 +294,21 @@ def _check(
             found=_named(answer),
             fix=fix,
         )
+
+
+def _unit_of_source(
+    drafts: Mapping[str, BlockDraft], flat: FlatBlock, item: Disagreement, other: str
+) -> str:
+    """Return the fix where plain numbers come from a block that can be told their unit."""
+    if item.expected is None or item.found.unit is None or other not in flat.wires:
+        return ""
+    if str(item.expected.unit) != "1" or item.found.elements:
+        return ""
+    source = drafts.get(flat.wires[other].source.rpartition(".")[0])
+    params = source.params if source is not None else None
+    if source is None or getattr(params, "unit", None) != "":
+        return ""
+    return f"say what {source.flat.path}'s numbers are: with: {{unit: {item.found.unit}}}"
 
 
 def _units_differ(a: Quantity, b: Quantity) -> bool:

@@ -259,6 +259,22 @@ blocks:
     assert problem.fix.startswith(fix) if fix else "say what" not in problem.fix
 
 
+def test_a_plain_source_beside_a_measurement_is_asked_for_its_unit() -> None:
+    text = """
+rate: 100 Hz
+blocks:
+  target: {use: blocks.SineWave}
+  angle: {use: blocks.SineWave, with: {unit: rad}}
+  pid: {use: blocks.PID, in: {setpoint: target.y, measured: angle.y}}
+"""
+    with pytest.raises(LoadError) as caught:
+        checked_text(text, Path("graph.yaml"))
+    (problem,) = caught.value.report.problems
+    assert (problem.expected, problem.found) == ("plain numbers", "rad")
+    assert problem.fix == "say what target's numbers are: with: {unit: rad}"
+    checked_text(text.replace("SineWave}", "SineWave, with: {unit: rad}}"), Path("graph.yaml"))
+
+
 UNLIKE = """\
   v: {use: blocks.Constant, with: {value: [3 V]}}
   w: {use: blocks.Constant, with: {value: [1 rad/s]}}

@@ -8,7 +8,6 @@ import pytest
 from aloft.extensions.studio.live.texts import (
     MOST_LINES,
     ValueTexts,
-    duration,
     list_names,
     tick_text,
     time_texts,
@@ -16,6 +15,7 @@ from aloft.extensions.studio.live.texts import (
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.signals import DTYPES
 from aloft.runtime.loading import checked_file
+from aloft.runtime.running.lateness import duration
 from aloft.runtime.running.memory import Memory
 
 MICROSECOND = 1000
