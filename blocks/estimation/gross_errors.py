@@ -9,7 +9,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
-from ..signals import DynamicsTerms, ImuReading, JointState, Phase, PhaseState
+from ..signals import DynamicsTerms, FootLoad, ImuReading, JointState, Phase, PhaseState
 from .fault_detector_state import (
     FaultDetectorConstants,
     FaultDetectorParams,
@@ -55,6 +55,16 @@ def gravity_looks_like(read: Array, right: Array) -> str:
     best = min(near.values())
     found = [name for name, off in near.items() if off < best + 0.1 * GRAVITY]
     return f": {' or '.join(found)} looks wrong" if best < 0.3 * GRAVITY else ""
+
+
+def push_looks_like(read: Array, right: Array) -> str:
+    """Say which error of a driver a reading in squat or thrust looks like."""
+    along = float(read @ right / (right @ right))
+    if -2.0 < along < -0.5:
+        return ": its sign looks wrong"
+    if 0.5 / GRAVITY < along < 2.0 / GRAVITY:
+        return ": it looks like g in place of m/s^2"
+    return ""
 
 
 def vector_text(values: Array) -> str:
@@ -118,6 +128,39 @@ def find_gross_gravity(
         state.stop = Stop.GRAVITY
         state.reading[:] = imu.specific_force
         state.right[:] = GRAVITY * scratch.up
+
+
+@kernel
+def find_gross_push(
+    judged: bool,
+    imu: ImuReading,
+    load: FootLoad,
+    terms: DynamicsTerms,
+    phase: PhaseState,
+    state: FaultDetectorState,
+    params: FaultDetectorParams,
+    constants: FaultDetectorConstants,
+    scratch: FaultDetectorScratch,
+) -> None:
+    """Count the ticks of squat and thrust in which the accelerometer reads less than a share of what the legs push.
+
+    Feet only push, and what they push by the legs' torques is what a mass on them feels. Judged is where
+    they carry more than ``open_load``.
+    """
+    pushed = 0.0
+    for foot in range(load.force.shape[0]):
+        pushed += load.force[foot] / constants.weight
+    gross, read = False, 0.0
+    heavy = judged and params.gross_push > 0.0 and pushed > params.open_load
+    if heavy and away_from_feet(terms, phase, scratch):
+        for axis in range(3):
+            read += imu.specific_force[axis] * scratch.up[axis]
+        gross = not read > params.gross_push * GRAVITY * pushed
+    state.gross[4] = state.gross[4] + 1 if gross else 0
+    if state.gross[4] > constants.gross_ticks[0]:
+        state.stop = Stop.PUSH
+        state.reading[:] = imu.specific_force
+        state.right[:] = GRAVITY * pushed * scratch.up
 
 
 @kernel
