@@ -87,8 +87,12 @@ class FaultDetectorParams(Parameters):
         0.3, ge=0.0,
         text="difference of the accelerometer at rest from gravity over the legs, in g, that does; zero: none",
     )  # fmt: skip
+    largest_rate: float = parameter(
+        40.0, unit="rad/s", ge=0.0,
+        text="reading of the gyroscope, beyond the range of any, that ends a run at once; zero: none",
+    )  # fmt: skip
     gross_push: float = parameter(
-        0.5, ge=0.0, lt=1.0,
+        0.3, ge=0.0, lt=1.0,
         text="share of what the legs push that the accelerometer must read in squat and thrust, or the run ends; zero: any",
     )  # fmt: skip
     suspects_end: bool = parameter(
@@ -127,7 +131,7 @@ class FaultDetectorState(Signal):
     gross = Field(
         5,
         dtype="int64",
-        text="ticks in a row with a gross error of gyroscope axes, gravity and push",
+        text="ticks in a row with a gross error of gyroscope axes (large ones count three times), gravity and push",
     )
     rested = Field(dtype="int64", text="ticks of rest so far")
     stop = Field(dtype="int64", values=Stop, text="why the run was ended")

@@ -121,7 +121,7 @@ class LinkSettings:
     lease: float = LEASE
     """Silence after which the other machines take a part for gone [s]."""
     patience: float = PATIENCE
-    """How long a part in lockstep waits for a message [s]."""
+    """The longest time for which a part in lockstep waits for a message [s]."""
 
     def policy_of(self, source: str) -> LinkPolicy:
         """Return the policy of the links that carry the outputs of the block ``source``."""

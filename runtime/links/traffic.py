@@ -1,4 +1,4 @@
-"""What has come from another machine so far, in words: for the errors that say why a part gives up."""
+"""Counts messages from another machine and puts that into words, for the errors with which a part gives up."""
 
 from __future__ import annotations
 
