@@ -77,7 +77,7 @@ plans: $(COMPLETE)  ## make the shipped plans anew, one for every file in graphs
 	@$(SINGLE) $(BIN)/aloft plan $(LANDINGS:%=graphs/tasks/%.yaml) --rehearse-landing --keep graphs/plans --no-pictures
 
 docs: $(COMPLETE)  ## make what is generated under docs/
-	@$(BIN)/aloft blocks --markdown > docs/blocks.md
+	@$(BIN)/aloft blocks --markdown docs/blocks
 	@$(BIN)/python lab/pages/refresh.py
 	@$(BIN)/python lab/pages/study_data.py mark
 	@$(BIN)/python lab/pages/make_pictures.py

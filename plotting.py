@@ -8,9 +8,9 @@ random names are written.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -188,6 +188,7 @@ class Panel:
         x_label: what x is, with its unit in brackets; empty where a panel below says it.
         x_range: from where to where x goes; by default all that the lines have.
         shades: stretches of x with another background.
+        y_names: the names of the values of an enumeration, which y has on its axis.
     """
 
     title: str
@@ -195,6 +196,7 @@ class Panel:
     x_label: str = "time [s]"
     x_range: tuple[float, float] | None = None
     shades: Sequence[Shade] = ()
+    y_names: Mapping[int, str] = field(default_factory=dict)
 
 
 def draw_panels(panels: Sequence[tuple[Axes, Panel]]) -> None:
@@ -226,7 +228,13 @@ def panels_figure(panels: Sequence[Panel], title: str) -> Figure:
     """Draw panels one below the other, each as wide as a page."""
     figure = new_figure(9.0, 0.6 + 2.4 * len(panels), title)
     axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
-    draw_panels(list(zip(axes, panels, strict=True)))
+    # x is named once where all panels share it
+    shared = len({panel.x_label for panel in panels}) == 1
+    shown = [
+        *(replace(panel, x_label="") if shared else panel for panel in panels[:-1]),
+        panels[-1],
+    ]
+    draw_panels(list(zip(axes, shown, strict=True)))
     return figure
 
 
@@ -279,10 +287,19 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
         drawn[0].set_gid("limit" if line.limit else "line")
     axes.set_xlim(start, end)
     axes.margins(y=0.06)
+    if panel.y_names:
+        marks = occurring(panel)
+        axes.set_yticks(list(marks), labels=list(marks.values()))
     if panel.title:
         named = any(shade.name for shade in panel.shades)
         axes.set_title(panel.title, pad=13.0 if named else 5.0)
     axes.set_xlabel(panel.x_label)
+
+
+def occurring(panel: Panel) -> dict[int, str]:
+    """Return the named values of y that occur in a panel, from the lowest."""
+    values = {float(y) for line in panel.lines for y in np.unique(line.y[np.isfinite(line.y)])}
+    return {value: name for value, name in sorted(panel.y_names.items()) if float(value) in values}
 
 
 def _numbers(lines: Sequence[Curve]) -> list[int]:

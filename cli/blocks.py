@@ -1,8 +1,7 @@
-"""``aloft blocks``: all blocks, and the contract of one; also as a page of Markdown, docs/blocks.md."""
+"""``aloft blocks``: all blocks, and the contract of one; also as pages of Markdown, docs/blocks."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,15 +21,23 @@ def blocks(
     ] = "",
     as_json: AsJson = False,
     markdown: Annotated[
-        bool, typer.Option(help="Print the reference of the shipped blocks as Markdown.")
-    ] = False,
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Write the reference of the shipped blocks there as Markdown."
+        ),
+    ] = None,
 ) -> None:
     """List all blocks, or print the contract of one: equations, ports, units, parameters."""
     with errors_reported(as_json):
-        found = [reference(name)] if name else all_references(ours=markdown)
-    if markdown:
-        typer.echo(reference_page(found), nl=False)
-    elif as_json:
+        found = [reference(name)] if name else all_references(ours=markdown is not None)
+        if markdown is not None:
+            from .block_pages import reference_pages
+
+            markdown.mkdir(parents=True, exist_ok=True)
+            for file, text in reference_pages(found).items():
+                (markdown / file).write_text(text, encoding="utf-8")
+            return
+    if as_json:
         print_json(found[0].as_json() if name else {"blocks": [each.as_json() for each in found]})
     elif name:
         print_contract(console(), found[0])
@@ -73,6 +80,8 @@ def print_contract(out: Console, block: BlockReference) -> None:
     """Print a block's docstring and the tables of its declarations."""
     out.print(f"[bold]{block.name}[/]  ({block.machine})\n")
     out.print(block.text, markup=False, soft_wrap=True)
+    out.print("\n[bold]In a graph[/]")
+    out.print(block.example, markup=False, soft_wrap=True)
     for title, ports in (
         ("Inputs", block.inputs),
         ("Outputs", block.outputs),
@@ -101,58 +110,3 @@ def port_rows(ports: tuple[PortReference, ...]) -> list[tuple[str, str, str, str
         rows.append((port.name, port.signal, "", "", text))
         rows += [("", "", field.name, field.type, field.text) for field in port.fields]
     return rows
-
-
-HEAD = """# Blocks
-
-Made from the code by `aloft blocks --markdown > docs/blocks.md`; do not edit. A *Mealy* block's
-outputs follow from its inputs in the same tick, a *Moore* block's from its state alone. Parameters
-marked *live* can be changed while a graph runs: `aloft params set block.parameter=value`.
-"""
-
-
-def reference_page(blocks: Sequence[BlockReference]) -> str:
-    """Write the whole page: a list of all blocks, then a section for each."""
-    listing = [f"- [`{b.name}`](#{anchor(b.name)}): {b.summary}" for b in blocks]
-    sections = [section(block) for block in blocks]
-    return "\n".join([HEAD, *listing, "", *sections]).rstrip() + "\n"
-
-
-def anchor(name: str) -> str:
-    """Return the anchor of a heading."""
-    return name.lower().replace(".", "")
-
-
-def section(block: BlockReference) -> str:
-    """Write a block's heading, docstring and tables."""
-    parts = [f"## {block.name}", "", f"*{block.machine}*", "", "```text", block.text, "```", ""]
-    for title, ports in (
-        ("Inputs", block.inputs),
-        ("Outputs", block.outputs),
-        ("State", block.states),
-    ):
-        if ports:
-            parts += [f"**{title}**", "", *port_table(ports), ""]
-    if block.parameters:
-        parts += ["**Parameters**", "", "| name | type | default | unit | bounds | what it is |"]
-        parts += ["|---|---|---|---|---|---|"]
-        for p in block.parameters:
-            cells = (f"`{p.name}`", p.type, p.default or "required", p.unit, p.bounds, p.full_text)
-            parts.append(row(cells))
-        parts.append("")
-    return "\n".join(parts)
-
-
-def port_table(ports: Sequence[PortReference]) -> list[str]:
-    """Write one row a port, its fields in the last column."""
-    lines = ["| port | signal | what it is | fields |", "|---|---|---|---|"]
-    for port in ports:
-        text = f"{port.text} ({port.note})" if port.note else port.text
-        fields = "; ".join(f"{field.name}: {field.type}" for field in port.fields)
-        lines.append(row((f"`{port.name}`", port.signal, text, fields)))
-    return lines
-
-
-def row(cells: Sequence[str]) -> str:
-    """Write one row of a table, with what would end a cell escaped."""
-    return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"

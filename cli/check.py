@@ -15,10 +15,6 @@ if TYPE_CHECKING:
     from ..runtime.language.stages import CheckedGraph
 
 
-OWN = f"{__package__.partition('.')[0]}."
-"""The start of the names of aloft's own modules."""
-
-
 def check(
     graph: Annotated[Path | None, typer.Argument(help="The graph file.")] = None,
     overrides: CompletedOverrides = None,
@@ -31,6 +27,7 @@ def check(
     ] = False,
 ) -> None:
     """Report every mistake in a graph at once: where, what is expected, what is found, the fix."""
+    from ..runtime.language.extensions import is_own
     from ..runtime.loading import checked_file
 
     if schema:
@@ -42,7 +39,7 @@ def check(
         raise typer.BadParameter("a graph file is needed, or --schema")
     with errors_reported(as_json):
         checked = checked_file(graph, overrides or [])
-        users = any(not spec.block_type.__module__.startswith(OWN) for spec in checked.blocks)
+        users = any(not is_own(spec.block_type.__module__) for spec in checked.blocks)
         warnings = check_users_blocks(checked) if users else []
     if checked.machines:
         from ..runtime.transports.registry import open_endpoints

@@ -79,7 +79,9 @@ def panels_of(run: RecordedRun, name: str, start: float | None, end: float | Non
     kept &= run.time >= start if start is not None else True
     kept &= run.time <= end if end is not None else True
     if not kept.any():
-        raise AloftError(f"nothing was recorded between {start} s and {end} s")
+        from ..runtime.running.plots import nothing_between
+
+        raise AloftError(nothing_between(start, end))
     named = run.header.robot.element_names if run.header.robot else {}
     panels = []
     for each in found:
@@ -99,8 +101,6 @@ def overlaid(runs: Sequence[Sequence[Panel]], files: Sequence[Path]) -> list[Pan
     Raises:
         AloftError: the runs have other fields of that name.
     """
-    from ..plotting import Panel
-
     if len(runs) == 1:
         return list(runs[0])
     if len({len(panels) for panels in runs}) > 1:
@@ -108,9 +108,9 @@ def overlaid(runs: Sequence[Sequence[Panel]], files: Sequence[Path]) -> list[Pan
     stems = [file.stem for file in files]
     shown = stems if len(set(stems)) == len(stems) else [str(file) for file in files]
     return [
-        Panel(
-            same[0].title,
-            [
+        replace(
+            same[0],
+            lines=[
                 replace(line, name=f"{name} {line.name}".rstrip())
                 for name, panel in zip(shown, same, strict=True)
                 for line in panel.lines
@@ -130,7 +130,7 @@ def _panel(run: RecordedRun, name: str, places: Sequence[int], kept: Any) -> Pan
     named = field.shape not in ((), (1,))  # the only element needs no name
     lines = [Curve(labels[k] if named else "", run.time[kept], values[:, k]) for k in places]
     unit = unit_of(field)
-    return Panel(f"{name} [{unit}]" if unit else name, lines)
+    return Panel(f"{name} [{unit}]" if unit else name, lines, y_names=field.values)
 
 
 def _draw(panels: Sequence[Panel], title: str, svg: Path | None, png: Path | None) -> None:
@@ -154,6 +154,8 @@ def _draw(panels: Sequence[Panel], title: str, svg: Path | None, png: Path | Non
 
 def in_terminal(panel: Panel) -> str:
     """Draw a panel as text: Braille dots, the range of values on the left, that of time below."""
+    from ..plotting import occurring
+
     x = np.concatenate([np.asarray(line.x) for line in panel.lines])
     y = np.concatenate([np.asarray(line.y) for line in panel.lines])
     finite = y[np.isfinite(y)]
@@ -170,6 +172,9 @@ def in_terminal(panel: Panel) -> str:
         cells[row // 4, column // 2] |= _DOTS[column % 2][row % 4]
     rows_of_text = ["".join(map(chr, row)) for row in cells.tolist()]
     labels = {0: f"{high:.4g}", _HEIGHT - 1: f"{low:.4g}"}
+    if panel.y_names:
+        step = (high - low) / (_HEIGHT - 1)
+        labels = {round((high - v) / step): name[:10] for v, name in occurring(panel).items()}
     names = [line.name for line in panel.lines if line.name]
     head = panel.title + (f": {', '.join(names)}" if names else "")
     body = [f"{labels.get(number, ''):>10} {row}" for number, row in enumerate(rows_of_text)]

@@ -161,6 +161,8 @@ class Drawn:
                 "B[1, 1:]",
                 "A[2, ::-1]",
             ]
+        if length == 1:
+            found += ["v[k : k + 1]", "A[1, 1:2]", "x[k : k + 1]"]
         if length == 2:
             found += [
                 "A[0, 1:]",
@@ -234,7 +236,17 @@ class Drawn:
             f"np.sum({a})", f"({a}).max()", f"np.min({a})", f"np.argmax({a})", f"np.linalg.norm({a})", f"sum({self.part(3)})",
             f"np.mean({a})", "np.sum(A)", "np.any(on)", "np.all(v < 3.0)", f"({self.part(3)} @ {self.vector(3, 1)})",
             "np.max(n)", "np.sum(n)", f"np.prod({self.part(2)})", f"np.argmin({a})", "(v @ A) @ w",
+            f"np.sum({self.pick('x', 'q', 'body.x', 'v')}[{self.cut_open()}])", f"({a} - np.dot({a}, {a})).min()",
+            f"sum({self.pick('x', 'q')}[{self.cut_open()}])", f"np.abs({a}).max()", f"np.sum(B {self.pick('+', '*')} {self.part(4)})",
+            f"np.sum({self.part(3)} * {self.part(1)})", f"np.mean(B[{self.cut_open()}, 1] - {self.number(1)})",
         )  # fmt: skip
+
+    def cut_open(self) -> str:
+        """Draw the bounds of a slice, of which one or both are known in the run only, and may be beyond."""
+        last = self.pick(
+            "", "k", "k + 2", "k + 3", "k + 7", "9", "3", "-1", "-k", "k - 2", "len(x)", "n[0]"
+        )
+        return f"{self.pick('', '0', '1', '4', '7', 'k', '-k', '-2', 'k + 2', 'n[1]')}:{last}"
 
     # Statements
 
@@ -246,8 +258,18 @@ class Drawn:
         return f"{stem}{self.count}"
 
     def statement(self, depth: int = 2) -> None:
-        form = self.chance.randrange(22)
-        if form < 4:
+        form = self.chance.randrange(24)
+        if form == 22:
+            cut, gain = self.cut_open(), self.pick("*", "+", "-")
+            source = self.pick(
+                self.number(1), f"q[{cut}] {gain} 2.0", f"x[{cut}]", f"x[{cut}] {gain} q[{cut}]"
+            )
+            self.write(f"q[{cut}] {self.pick('=', '+=', '*=')} {source}")
+        elif form == 23:
+            self.write(
+                f"r[{self.chance.randrange(8)}] = ({self.part(self.chance.choice((2, 3, 4)))}).copy().sum()"
+            )
+        elif form < 4:
             name, size = self.chance.choice([("p", 3), ("q", 6), *self.own.items()])
             text, length = self.cut(size) if self.below(0.6) else (":", size)
             value = self.number() if self.below(0.2) else self.vector(length)
@@ -287,7 +309,7 @@ class Drawn:
                 f"{target} {self.pick('=', '+=')} {source} {self.pick('+', '*', '//', '%', '-')} {self.pick('3', '-2', '5')}"
             )
         elif form == 11 and self.indent == 1:
-            name, length = self.new("c"), self.chance.choice((2, 3, 4))
+            name, length = self.new("c"), self.chance.choice((1, 2, 3, 4))
             self.write(
                 f"{name} = " + self.pick(
                     f"np.zeros({length})", f"np.array([{', '.join(self.number(1) for _ in range(length))}])",

@@ -10,12 +10,15 @@ from types import FunctionType
 
 import numpy as np
 import pytest
+import yaml
 
 import aloft
-from aloft.cli.blocks import all_references, reference_page
+from aloft.cli.block_pages import as_markdown, reference_pages
+from aloft.cli.blocks import all_references
 from aloft.robots.description import find_robot
 from aloft.robots.importing.package_files import find_file
 from aloft.runtime.language.block import Block
+from aloft.runtime.language.registry import find_block
 from aloft.runtime.language.runtime_block import BlockHooks
 from aloft.runtime.loading import LoadError
 
@@ -23,7 +26,11 @@ ROOT = Path(__file__).parent.parent
 FILE = re.compile(r"<!-- file: (\S+) -->\n```\w+\n(.*?)```", re.DOTALL)
 EXCERPT = re.compile(r"<!-- from: (\S+) -->\n```\w+\n(.*?)```", re.DOTALL)
 YAML = re.compile(r"```yaml\n(.*?)```", re.DOTALL)
-PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    *sorted(ROOT.glob("*.md")),
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs/blocks").glob("*.md")),
+]
 
 
 @pytest.fixture(scope="module")
@@ -183,10 +190,43 @@ def test_a_block_says_what_it_needs_of_a_robot(tmp_path: Path) -> None:
 
 
 def test_the_reference_of_blocks_is_up_to_date() -> None:
-    written = (ROOT / "docs" / "blocks.md").read_text()
-    assert written == reference_page(all_references(ours=True)), (
-        "run: aloft blocks --markdown > docs/blocks.md"
+    folder = ROOT / "docs" / "blocks"
+    written = {file.name: file.read_text() for file in folder.iterdir()}
+    assert written == reference_pages(all_references(ours=True)), (
+        "run: make docs (aloft blocks --markdown docs/blocks)"
     )
+
+
+def test_the_example_of_every_block_is_a_block_of_a_graph() -> None:
+    """It is YAML, its parameters are taken, and it wires what the block needs."""
+    for block in all_references(ours=True):
+        ((_, entry),) = yaml.safe_load(block.example).items()
+        kind = find_block(entry["use"])
+        needed = [name for name, port in kind.inputs.items() if not port.optional]
+        assert (entry["use"], list(entry.get("in", {}))) == (block.name, needed)
+        for name, value in entry.get("with", {}).items():
+            assert kind.Params.model_fields[name].is_required(), (block.name, name)
+            example = kind.example_parameters()[name]
+            assert value == example or str(example).endswith(f"/{value}"), (block.name, name)
+
+
+def test_no_page_of_blocks_needs_a_long_scroll() -> None:
+    """Half of what the one page of all blocks once had is the most of a family."""
+    sizes = {file.name: file.stat().st_size for file in (ROOT / "docs" / "blocks").iterdir()}
+    assert max(sizes.values()) < 100_000 and len(sizes) >= 10, sizes
+
+
+@pytest.mark.parametrize(
+    ("text", "page"),
+    [
+        ("With ``law: paper``\nit is 2*x and y = a * b.", "With `law: paper`\nit is 2\\*x and y = a * b."),
+        ("The law:\n\n    p^x = W |l|\n    q = <b>\n\nand so on", "The law:\n\n```text\np^x = W |l|\nq = <b>\n```\n\nand so on"),
+        ("a <b> in lower <= u, y[n] = u[n-k]", "a \\<b> in lower <= u, y[n] = u[n-k]"),
+        ("* one, with\n  a second line;\n* two", "* one, with\n  a second line;\n* two"),
+    ],
+)  # fmt: skip
+def test_a_docstring_becomes_markdown(text: str, page: str) -> None:
+    assert as_markdown(text) == page
 
 
 def test_the_block_and_the_graph_of_the_readme_run_as_they_stand(tmp_path: Path) -> None:

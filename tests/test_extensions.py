@@ -22,7 +22,7 @@ from aloft.runtime.language.extensions import (
 )
 
 ROOT = Path(aloft.__file__).parent
-JUMP_HASH = "d899a365a3d5b2eb445d93941b896d03"
+JUMP_HASH = "b17451f3d8c225c8437d3a0c6ec34667"
 CHECK = """
 import json, sys
 from pathlib import Path

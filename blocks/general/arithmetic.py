@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
 from typing import Any, Literal
 
 import numpy as np
 
 from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
-from ...runtime.language.block import Block, Input, Output
+from ...runtime.language.block import Block, Context, Input, Output, UnmetRequirement
 from ...runtime.language.parameters import Parameters, ScalarOrVector, live_parameter, parameter
-from ...runtime.language.quantities import InputQuantities, OutputQuantities
+from ...runtime.language.quantities import InputQuantities, OutputQuantities, Quantity
 from ...runtime.language.signals import Field, Signal
 from ...runtime.language.unit_algebra import read_unit
 from .vectors import (
@@ -22,7 +21,9 @@ from .vectors import (
     UnitOfProduct,
     Vector,
     VectorParameters,
+    VectorUnits,
     matrix_rows,
+    said,
 )
 
 
@@ -93,8 +94,7 @@ class Product(Block):
         a, b = inputs["a"], inputs["b"]
         if a is None or b is None:
             return {}
-        y = a.times(b.unit, 1 if params.operation == "multiply" else -1)
-        return {"y": replace(y, frame=a.frame or b.frame)}
+        return {"y": a.product(b, 1 if params.operation == "multiply" else -1)}
 
     @kernel
     @staticmethod
@@ -114,10 +114,11 @@ class Rows(Signal):
 class MatrixGain(Block):
     """A constant matrix times the input: y = K u, K with m rows and n columns.
 
-    Sums run from the first column to the last, so results are the same on every machine.
+    Sums run from the first column to the last, so results are the same on every machine. Where u joins unlike
+    units, as in a feedback of states, ``input_units`` and ``output_units`` say what comes in and goes out.
     """
 
-    class Params(SourceParameters):
+    class Params(SourceParameters, VectorUnits):
         in_unit = ("matrix",)
 
         matrix: Matrix = parameter(text="K, as a list of its rows", min_length=1)
@@ -135,16 +136,29 @@ class MatrixGain(Block):
         return {"m": len(params.matrix), "n": len(params.matrix[0])}
 
     @classmethod
+    def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
+        """Report lists of units that do not fit the matrix."""
+        assert isinstance(params, cls.Params)
+        return params.wrong_units(len(params.matrix[0]), len(params.matrix))
+
+    @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
         """Two rows and three columns."""
         return {"matrix": [[1.0, 2.0, -1.0], [0.0, 0.5, 3.0]]}
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """Return the unit of u times that of the matrix; the frame is that of the parameter."""
+        """Return what the parameters say of y, or the unit of u times that of the matrix; the frame is that of
+        the parameter."""
         assert isinstance(params, cls.Params)
         u = inputs["u"]
-        return {"y": u and replace(u.times(read_unit(params.unit)), frame=params.frame)}
+        params.check_inputs(inputs)
+        if params.output_units is not None:
+            return {"y": said(params.output_units, params.frame)}
+        if u is None:
+            return {}
+        unit = Quantity(u.unit).times(read_unit(params.unit)).unit  # sums of unlike units have none
+        return {"y": Quantity(unit, params.frame)}
 
     @kernel
     @staticmethod

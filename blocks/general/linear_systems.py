@@ -13,16 +13,18 @@ from ...mathematics.linear_systems import advance_transfer_function, controllabl
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Context, Input, Output, State, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
+from ...runtime.language.quantities import InputQuantities, OutputQuantities
 from ...runtime.language.signals import Field, Signal
+from ...runtime.language.unit_algebra import read_unit
 from .vectors import (
     InUnit,
     Matrix,
     SourceParameters,
-    UnitFromParameters,
-    UnitOfProduct,
     Vector,
     VectorParameters,
+    VectorUnits,
     matrix_rows,
+    said,
 )
 
 
@@ -44,8 +46,9 @@ class SystemState(Signal):
     value = Field("order", text="the system's state")
 
 
-class SystemParameters(SourceParameters):
-    """A linear system in state space. ``unit`` and ``frame`` are those of its outputs."""
+class SystemParameters(SourceParameters, VectorUnits):
+    """A linear system in state space. ``unit`` and ``frame`` are those of its outputs, whose units
+    ``output_units`` gives one by one."""
 
     a: Matrix = parameter(text="A, order x order, as a list of rows", min_length=1)
     b: Matrix = parameter(text="B, order x inputs", min_length=1)
@@ -70,6 +73,7 @@ class SystemParameters(SourceParameters):
         yield from _unequal("c", "columns", len(self.c[0]), order)
         if self.initial is not None:
             yield from _unequal("initial", "elements", len(self.initial), order)
+        yield from self.wrong_units(len(self.b[0]), len(self.c))
 
     def matrices(self, period: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the discrete A and B of a period [s]."""
@@ -100,7 +104,7 @@ def advance_state(
     x.value[:] = scratch.next
 
 
-class LinearSystem(UnitFromParameters, Block):
+class LinearSystem(Block):
     """The base of the linear systems in state space."""
 
     Params = SystemParameters
@@ -122,6 +126,15 @@ class LinearSystem(UnitFromParameters, Block):
         """Report matrices that do not fit each other."""
         assert isinstance(params, SystemParameters)
         return params.wrong_sizes()
+
+    @classmethod
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
+        """Check the inputs, and return what the parameters say of the outputs."""
+        assert isinstance(params, SystemParameters)
+        params.check_inputs(inputs)
+        if params.output_units is None:
+            return {"y": params.quantity()}
+        return {"y": said(params.output_units, params.frame)}
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:
@@ -223,17 +236,18 @@ class TransferState(Signal):
     value = Field(("n", "order"), text="states in the controllable canonical form")
 
 
-class TransferFunction(UnitOfProduct, Block):
+class TransferFunction(Block):
     """A proper rational transfer function, the same for every element, from rest.
 
     Coefficients are of falling powers, of s for a continuous function and of z for a discrete one:
     ``numerator: [1], denominator: [0.1, 1]`` is 1 / (0.1 s + 1). A continuous one is discretised
     exactly for an input that is held over the block's period, by the matrix exponential of its
     controllable canonical form. Outputs follow from inputs of the same tick; for a loop around a
-    strictly proper system use ``StateSpace``.
+    strictly proper system use ``StateSpace``. Units are given as that of the function, ``unit: rad/s/V``, or as
+    those of its ends, ``input_units: V`` and ``output_units: rad/s``.
     """
 
-    class Params(VectorParameters, InUnit):
+    class Params(VectorParameters, InUnit, VectorUnits):
         numerator: list[float] = parameter(text="coefficients of falling powers", min_length=1)
         denominator: list[float] = parameter(text="coefficients of falling powers", min_length=2)
         time: Literal["continuous", "discrete"] = parameter(
@@ -264,6 +278,7 @@ class TransferFunction(UnitOfProduct, Block):
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:
         """Report a function that is not proper, or a denominator without the degree it seems to have."""
         assert isinstance(params, cls.Params)
+        yield from params.wrong_units(params.n, params.n)
         if params.denominator[0] == 0.0:
             yield UnmetRequirement("the denominator's first coefficient is zero", "denominator")
         if len(params.numerator) > len(params.denominator):
@@ -273,6 +288,17 @@ class TransferFunction(UnitOfProduct, Block):
                 expected=f"at most {len(params.denominator)} coefficients",
                 found=str(len(params.numerator)),
             )
+
+    @classmethod
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
+        """Check the input, and return the units that are said of y, or u times the unit of the function."""
+        assert isinstance(params, cls.Params)
+        u = inputs["u"]
+        if params.input_units is not None:
+            params.check_inputs(inputs)
+        if params.output_units is not None:
+            return {"y": said(params.output_units, u.frame if u else None)}
+        return {"y": u and u.times(read_unit(params.unit))}
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:

@@ -7,7 +7,7 @@ from ...runtime.language.block import Block, Input, Output, State
 from ...runtime.language.parameters import Parameters, ScalarOrVector, live_parameter
 from ...runtime.language.quantities import InputQuantities, OutputQuantities
 from ...runtime.language.signals import Field, Signal
-from ...runtime.language.unit_algebra import read_unit
+from ...runtime.language.unit_algebra import SECOND, read_unit, times
 from .vectors import (
     NEVER,
     Bounded,
@@ -47,6 +47,8 @@ class PID(Bounded, Block):
     """
 
     class Params(VectorParameters, InUnit):
+        in_unit = ("kp",)
+
         kp: ScalarOrVector = live_parameter(1.0, text="proportional gain")
         ki: ScalarOrVector = live_parameter(0.0, text="integral gain, per second")
         kd: ScalarOrVector = live_parameter(0.0, text="derivative gain, in seconds")
@@ -62,6 +64,13 @@ class PID(Bounded, Block):
         )
         lower: ScalarOrVector | None = live_parameter(None, text="the least output")
         upper: ScalarOrVector | None = live_parameter(None, text="the greatest output")
+
+        def own_unit(self, name: str) -> str:
+            """Return the unit of a gain, as the class's text says."""
+            unit = read_unit(self.unit)
+            if unit is None or name not in ("kp", "ki", "kd"):
+                return ""
+            return str(times(unit, SECOND, {"kp": 0, "ki": -1, "kd": 1}[name]))
 
     class Constants(Bounds):
         """The bounds, and what follows from the other parameters."""

@@ -95,6 +95,9 @@ class RotateVector(Block):
         u = inputs["u"]
         if u is None:
             return {}
+        if u.elements:
+            inputs.refuse("u", "a rotation mixes its elements")
+            return {"y": Quantity(None, after)}
         inputs.agree("u", Quantity(u.unit, before), f"the block turns vectors from {before}")
         return {"y": Quantity(u.unit, after)}
 

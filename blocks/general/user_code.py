@@ -112,14 +112,20 @@ class Expression(KernelBlock):
         if len(known) < len(read):
             return {"y": None if params.unit is None else Quantity(said, frame)}
         units = {name: parse_unit(unit) for name, unit in params.units.items()}
-        try:
-            unit = unit_of(formula.tree, {**{n: q.unit for n, q in known.items()}, **units, **TIME})
-        except UnitError as error:
-            inputs.refuse(next(iter(known), "a"), f"in {params.expression!r} {error}")
-            return {"y": Quantity(said, frame)}
-        if said is not None and unit is not None and not said.matches(unit):
-            inputs.refuse(next(iter(known), "a"), f"the formula is in {unit}, not in {said}")
-        return {"y": Quantity(unit if said is None else said, frame)}
+        size = max((len(quantity.elements) for quantity in known.values()), default=0) or 1
+        found = []
+        columns = [quantity.units(size) for quantity in known.values()]
+        for given in zip(*columns, strict=False) if columns else [()]:
+            try:
+                here = dict(zip(known, given, strict=True))
+                unit = unit_of(formula.tree, {**here, **units, **TIME})
+            except UnitError as error:
+                inputs.refuse(next(iter(known), "a"), f"in {params.expression!r} {error}")
+                return {"y": Quantity(said, frame)}
+            if said is not None and unit is not None and not said.matches(unit):
+                inputs.refuse(next(iter(known), "a"), f"the formula is in {unit}, not in {said}")
+            found.append(unit if said is None else said)
+        return {"y": Quantity.of(found, frame)}
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, Any]:

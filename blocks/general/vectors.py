@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,7 +84,8 @@ class InitialValueParameters(VectorParameters):
     """The parameters of blocks that start from a vector."""
 
     initial: ScalarOrVector = parameter(
-        0.0, text="the first output: n numbers, or one for all elements"
+        0.0,
+        text="the first output: n numbers, or one for all elements; of a quaternion the identity where it is not given",
     )
 
     def start_value(self) -> NDArray[np.float64]:
@@ -152,6 +153,10 @@ class InUnit(Parameters):
 
     unit: UnitText = parameter("", text="unit of the numbers; nothing for plain ones")
 
+    def own_unit(self, name: str) -> str:
+        """Return ``unit`` for the numbers that are in it."""
+        return self.unit if name in self.in_unit else ""
+
     @model_validator(mode="before")
     @classmethod
     def _read_units(cls, data: Any) -> Any:
@@ -173,6 +178,65 @@ class SourceParameters(InUnit):
     def quantity(self) -> Quantity:
         """Return the quantity of the numbers."""
         return Quantity(read_unit(self.unit), self.frame)
+
+
+UnitTexts = str | list[str]
+"""A unit, or one for each element."""
+
+
+class VectorUnits(Parameters):
+    """The base of parameters of blocks whose inputs or outputs may each have a unit of their own."""
+
+    input_units: UnitTexts | None = parameter(
+        None, text="unit of u that is checked, or a list with one for each element"
+    )
+    output_units: UnitTexts | None = parameter(
+        None, text="unit of y, or a list with one for each element; in place of unit"
+    )
+
+    @field_validator("input_units", "output_units")
+    @classmethod
+    def _each_readable(cls, value: UnitTexts | None) -> UnitTexts | None:
+        for text in value if isinstance(value, list) else [value or ""]:
+            read_unit(text)
+        return value
+
+    @model_validator(mode="after")
+    def _said_once(self) -> Self:
+        if self.output_units is not None and getattr(self, "unit", None):
+            raise ValueError(
+                "unit and output_units both say what the outputs are; keep one of them"
+            )
+        return self
+
+    def wrong_units(self, inputs: int, outputs: int) -> Iterable[UnmetRequirement]:
+        """Report lists of units that do not fit the numbers of elements."""
+        for name, given, size in (
+            ("input_units", self.input_units, inputs),
+            ("output_units", self.output_units, outputs),
+        ):
+            if isinstance(given, list) and len(given) != size:
+                yield UnmetRequirement(
+                    f"{name} has {len(given)} units for {size} elements",
+                    parameter=name,
+                    expected=f"{size} units, or one for all",
+                    found=str(len(given)),
+                )
+
+    def check_inputs(self, inputs: InputQuantities) -> None:
+        """Check ``u`` by its units, or ask for them where it joins unlike ones."""
+        if self.input_units is not None:
+            inputs.agree("u", said(self.input_units), "input_units says so")
+            return
+        u = inputs["u"]
+        inputs.question("u", f"if that is meant, say so: input_units: {u}")
+
+
+def said(units: UnitTexts, frame: str | None = None) -> Quantity:
+    """Return the quantity that one unit, or a list with one for each element, says."""
+    if isinstance(units, str):
+        return Quantity(read_unit(units), frame)
+    return Quantity.of((read_unit(each) for each in units), frame)
 
 
 def _units_in(value: Any) -> list[str]:

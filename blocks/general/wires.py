@@ -9,9 +9,9 @@ from ...mathematics.kernel import kernel
 from ...robots.description import RobotDescription
 from ...runtime.language.block import Block, Context, Input, Output, UnmetRequirement
 from ...runtime.language.parameters import Parameters, parameter
-from ...runtime.language.quantities import UNCHECKED, InputQuantities, OutputQuantities
+from ...runtime.language.quantities import InputQuantities, OutputQuantities, Quantity
 from ...runtime.language.signals import Field, Signal
-from .vectors import UnitOfInput, Vector
+from .vectors import Vector
 
 
 class First(Signal):
@@ -60,11 +60,13 @@ class Mux(Pairs, Block):
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """Return the quantity that both have in common; the unit is not checked where they differ."""
+        """Return the quantity that both have in common; where they differ each element keeps its own unit."""
+        assert isinstance(params, PairSizes)
         a, b = inputs["a"], inputs["b"]
         if a is None or b is None:
             return {}
-        return {"y": a if a == b else UNCHECKED}
+        frame = a.frame if a.frame == b.frame else None
+        return {"y": Quantity.of((*a.units(params.n_a), *b.units(params.n_b)), frame)}
 
     @kernel
     @staticmethod
@@ -84,8 +86,13 @@ class Demux(Pairs, Block):
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
-        """Both are what u is."""
-        return {"a": inputs["u"], "b": inputs["u"]}
+        """Both are what u is; where its elements have unlike units, they keep their own."""
+        assert isinstance(params, PairSizes)
+        u = inputs["u"]
+        if u is None or not u.elements:
+            return {"a": u, "b": u}
+        first, second = u.elements[: params.n_a], u.elements[params.n_a :]
+        return {"a": Quantity.of(first, u.frame), "b": Quantity.of(second, u.frame)}
 
     @kernel
     @staticmethod
@@ -100,7 +107,7 @@ class Selected(Signal):
     value = Field("m", inferred=True, text="the elements, in the order asked for")
 
 
-class Selector(UnitOfInput, Block):
+class Selector(Block):
     """Some elements of the input, in any order, also repeated: y[i] = u[elements[i]], from 0."""
 
     class Params(Parameters):
@@ -118,6 +125,16 @@ class Selector(UnitOfInput, Block):
         """``n`` elements come in and ``m`` go out."""
         assert isinstance(params, cls.Params)
         return {"n": params.n, "m": len(params.elements)}
+
+    @classmethod
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
+        """Return the quantity of u, or of those of its elements that are selected."""
+        assert isinstance(params, cls.Params)
+        u = inputs["u"]
+        if u is None or not u.elements:
+            return {"y": u}
+        taken = (u.elements[k] for k in params.elements if 0 <= k < len(u.elements))
+        return {"y": Quantity.of(taken, u.frame)}
 
     @classmethod
     def requires(cls, params: Parameters, context: Context) -> Iterable[UnmetRequirement]:

@@ -21,7 +21,7 @@ from ...planner.library.jump_table import (
 )
 from ...runtime.language.block import Block, Context, Input, Metric, Output, State, UnmetRequirement
 from ...runtime.language.context import Clock
-from ...runtime.language.errors import BlockError
+from ...runtime.language.errors import BlockError, MissingExtraError
 from ...runtime.language.parameters import Parameters, parameter
 from ..signals import DelayEstimate, DynamicsTerms, JumpReference, Phase, PhaseState
 from .plan_progress import (
@@ -191,6 +191,27 @@ class JumpPlan(Block):
                 found=f"profile: {task.profile} in the task",
                 fix=f"actuators: {task.profile}, as a key of the graph",
             )
+        else:
+            yield from cls._missing_planner(params, context)
+
+    @classmethod
+    def _missing_planner(cls, params: Params, context: Context) -> Iterable[UnmetRequirement]:
+        """Report a task that no stored plan is for, where the library that makes one is not installed."""
+        from ...planner.task.files import need_planner
+
+        try:
+            need_planner()
+        except MissingExtraError as error:
+            assert context.robot is not None
+            task = planned_task(params, context)
+            if params.solve and plan_library(params, context.robot).path_of(task) is None:
+                reason, _, line = str(error).rpartition(": ")
+                yield UnmetRequirement(
+                    f"no stored plan is for the task {task.name!r}, and {reason}",
+                    parameter="task",
+                    expected="a task with a plan, as those that ship, or the library",
+                    fix=line,
+                )
 
     @classmethod
     def exported_values(cls, params: Parameters, context: Context) -> Mapping[str, Any]:

@@ -7,9 +7,18 @@ BLOCK = '''\
 
 from __future__ import annotations
 
-import numpy as np
-
-from aloft import Block, Field, Input, Output, Parameters, Signal, State, live_parameter, parameter
+from aloft import (
+    Block,
+    Field,
+    Input,
+    Output,
+    Parameters,
+    Signal,
+    State,
+    kernel,
+    live_parameter,
+    parameter,
+)
 
 
 class {name}Signal(Signal):
@@ -30,16 +39,12 @@ class {name}(Block):
     y = Output({name}Signal, text="the filtered numbers")
     x = State({name}Signal, text="the output of the run before")
 
-    def setup(self) -> None:
-        """Make room for the difference, so that no tick makes it."""
-        self._difference = np.zeros(self.params.n)
-
-    def step(self) -> None:
+    @kernel  # runs as machine code; plain Python, for libraries, takes self instead
+    @staticmethod
+    def step(u: {name}Signal, y: {name}Signal, x: {name}Signal, params: Params) -> None:
         """Go a share of the way to the input."""
-        np.subtract(self.u.value, self.x.value, out=self._difference)
-        np.multiply(self._difference, self.params.share, out=self._difference)
-        np.add(self.x.value, self._difference, out=self.x.value)
-        np.copyto(self.y.value, self.x.value)
+        x.value[:] = x.value + params.share * (u.value - x.value)
+        y.value[:] = x.value
 '''
 
 TEST_BLOCK = '''\

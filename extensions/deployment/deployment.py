@@ -24,6 +24,7 @@ from ...planner.library.library import shipped_folder, user_folder
 from ...runtime.bundle import copy_module, is_own_module, with_robot_beside
 from ...runtime.graph import load
 from ...runtime.language.errors import AloftError
+from ...runtime.language.extensions import is_own
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.links.part import part_graph
 from ...runtime.placement.placed import PlacedGraph, moves_actuators, split_over_machines
@@ -165,7 +166,7 @@ def _write_graph(graph: CheckedGraph, folder: Path) -> None:
     (folder / f"{graph.name}.yaml").write_text(text, encoding="utf-8")
     for spec in graph.blocks:
         name = getattr(spec, "use", "") or spec.block_type.__module__
-        if not spec.block_type.__module__.startswith("aloft."):
+        if not is_own(spec.block_type.__module__):
             copy_module(name.partition(":")[0], spec.block_type.__module__, folder)
 
 

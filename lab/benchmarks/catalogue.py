@@ -40,10 +40,12 @@ from .rows import Row
 from .scheduler import scheduler
 from .startup import startup
 from .stones import go2_staircase, staircase, stones
+from .tick.solvers import solvers
 from .tick.tick import tick
 
 BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "tick": tick,
+    "solvers": solvers,
     "startup": startup,
     "loading": loading,
     "scheduler": scheduler,

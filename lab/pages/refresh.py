@@ -39,6 +39,7 @@ from result_tables import (
     real_table,
     results_table,
     robot_files_table,
+    solver_table,
     table,
     tasks_table,
     tick_tables,
@@ -351,6 +352,11 @@ def write_tick(file: Path) -> None:
     (DOCS / TICK_PICTURE).write_text(tick_chart(found["rows"]), encoding="utf-8")
 
 
+def write_solvers(file: Path) -> None:
+    """Write the duration of a tick with every solver of quadratic programs."""
+    refresh(DOCS / "whole_body.md", "solvers", solver_table(read_json(file)))
+
+
 def write_twin(file: Path) -> None:
     """Write the twin beside the simulation; ``runs.parquet`` beside the summary says which seeds
     differ."""
@@ -410,6 +416,7 @@ PAGES = {
     "slopes": Page(write_slopes, f"{STUDIES}slopes.yaml", "results/slopes/summary.json"),
     "task_parameters": Page(write_task_parameters),
     "tasks": Page(write_tasks, f"{STUDIES}tasks.yaml", "results/tasks/summary.json"),
+    "solvers": Page(write_solvers, "aloft bench solvers --json > FILE", "FILE"),
     "tick": Page(write_tick, "aloft bench tick --tsid FOLDER --since COMMIT --json > FILE", "FILE"),
     "twin": Page(write_twin, f"{STUDIES}twin.yaml", "results/twin/summary.json"),
     "uneven": Page(write_uneven, f"{STUDIES}uneven.yaml", "results/uneven/summary.json"),

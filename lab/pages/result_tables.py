@@ -346,6 +346,18 @@ def ratio_table(found: Row) -> str:
     return f"{_circumstances(found)}\n\n" + table(TICK_HEAD, map(_ratio, found["rows"]))
 
 
+def solver_table(found: Row) -> str:
+    """Format the ticks with every solver: microseconds, the ratio to the own one's, and how far their torques are apart."""
+    cells = []
+    for row in found["rows"]:
+        if row["value"] is not None:
+            ratio = "1" if row["ratio"] is None else f"{row['ratio']:.3g}"
+            cells.append(
+                [row["name"].removeprefix("tick, "), f"{row['value']:.3g}", ratio, row["note"]]
+            )
+    return f"{_circumstances(found)}\n\n" + table(("tick", "us", "ratio", ""), cells)
+
+
 def _circumstances(found: Row) -> str:
     machine, load = found["machine"], found["load"]
     return (

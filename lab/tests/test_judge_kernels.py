@@ -14,9 +14,6 @@ def test_drawn_kernels_are_numpys(tmp_path, monkeypatch) -> None:
     assert tally.counts["taken"] >= 75, tally
 
 
-@pytest.mark.xfail(
-    reason="ends of slices beyond an array, and np.dot of reversed slices within max(): docs/known_gaps.md"
-)
 @pytest.mark.long
 def test_more_drawn_kernels_are_numpys_and_numbas(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))

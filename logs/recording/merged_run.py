@@ -6,9 +6,9 @@ like any other. It holds the ticks that every part has recorded.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import partial, reduce
 from hashlib import blake2b
 from os import PathLike
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from ...runtime.language.errors import AloftError, ExitCode
 from ...runtime.links.lockstep_link import LinkInput
@@ -26,8 +27,9 @@ from ...runtime.running.memory import Memory, Snapshot
 from ...runtime.running.sink import Note
 from ..file.format import Header, RecordedBlock
 from ..file.header import make_header
+from ..file.packed_rows import TickRows
 from ..file.reader import RecordedRun, read
-from .writer import RecordingWriter
+from .writer import PACKED_BYTES, ROWS_AT_ONCE, RecordingWriter
 
 Value = TypeVar("Value")
 _OF_ALL = ("life", "parameter")
@@ -253,20 +255,50 @@ def _joined(found: Iterable[Mapping[str, Value]]) -> dict[str, Value]:
     return {key: value for each in found for key, value in each.items()}
 
 
-def _pieces(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> Any:
-    """Yield ticks (n,) and rows (n, bytes) of the whole, some hundred at a time."""
+def _pieces(placed: PlacedGraph, parts: Mapping[str, RecordedRun]) -> Iterator[TickRows]:
+    """Yield ticks (n,) and rows (n, bytes) of the whole, as many at a time as are packed together."""
     whole = _whole_bus(placed, parts)
-    first, *others = (part.ticks for part in parts.values())
-    common = first
-    for ticks in others:
-        common = np.intersect1d(common, ticks, assume_unique=True)
-    for start in range(0, len(common), 512):
-        ticks = common[start : start + 512]
-        rows = {}
-        for machine, part in parts.items():
-            found, piece = part.window(int(ticks[0]), int(ticks[-1]) + 1)
-            rows[machine] = piece[np.searchsorted(found, ticks)]
-        yield ticks, whole.rows(rows)
+    waiting: list[TickRows] = []
+    count = size = 0
+    for ticks, of_parts in _common_rows(parts):
+        rows = whole.rows(of_parts)
+        waiting.append((ticks, rows))
+        count, size = count + len(ticks), size + rows.nbytes
+        if count >= ROWS_AT_ONCE or size >= PACKED_BYTES:
+            yield _joined_rows(waiting)
+            waiting, count, size = [], 0, 0
+    if waiting:
+        yield _joined_rows(waiting)
+
+
+def _joined_rows(pieces: Sequence[TickRows]) -> TickRows:
+    ticks, rows = zip(*pieces, strict=True)
+    return np.concatenate(ticks), np.concatenate(rows)
+
+
+def _common_rows(
+    parts: Mapping[str, RecordedRun],
+) -> Iterator[tuple[NDArray[np.int64], dict[str, NDArray[np.uint8]]]]:
+    """Yield the ticks (n,) that every part has, and the rows (n, bytes) of each.
+
+    Each part is unpacked once, a piece of its file at a time, whatever ticks the others lack. So rows of
+    megabytes need no more memory than a few pieces.
+    """
+    sources = {machine: part.pieces() for machine, part in parts.items()}
+    waiting: dict[str, TickRows] = {}
+    while True:
+        for machine, source in sources.items():
+            while machine not in waiting or not len(waiting[machine][0]):
+                piece = next(source, None)
+                if piece is None:
+                    return
+                waiting[machine] = piece
+        end = min(int(ticks[-1]) for ticks, _ in waiting.values())
+        until = {m: int(np.searchsorted(t, end, side="right")) for m, (t, _) in waiting.items()}
+        common = reduce(np.intersect1d, (t[: until[m]] for m, (t, _) in waiting.items()))
+        if len(common):
+            yield common, {m: r[np.searchsorted(t, common)] for m, (t, r) in waiting.items()}
+        waiting = {m: (t[until[m] :], r[until[m] :]) for m, (t, r) in waiting.items()}
 
 
 def _keyframes(

@@ -38,8 +38,8 @@ def names_along(
 ) -> list[str]:
     """Return the names along one axis of a field.
 
-    They are the robot's own names for its dimensions; x, y, z (and w) for three or four elements;
-    linear and angular x, y, z for six; else numbers.
+    They are the robot's own names for its dimensions; x, y, z (and w) for three or four elements
+    of a vector; linear and angular x, y, z for six; else numbers.
     """
     if robot is not None:
         known = dict(robot.element_names)
@@ -50,9 +50,11 @@ def names_along(
             known["n_joints"] = robot.transmission.motors
         if size in known:
             return list(known[str(size)])
-    if length in (3, 4):
+    # a size that a graph gives makes axes only of what is in a frame: three gains are no x, y, z
+    vector = isinstance(size, int) or field.frame is not None
+    if vector and length in (3, 4):
         return list("xyzw"[:length])
-    if length == 6:
+    if vector and length == 6:
         return [f"{kind} {axis}" for kind in ("linear", "angular") for axis in "xyz"]
     return [str(k) for k in range(length)]
 

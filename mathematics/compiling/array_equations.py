@@ -7,7 +7,7 @@ import copy
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from .expressions import indices_of, repeats, shown
+from .expressions import NUMBERS, indices_of, numbers, repeats, shown
 from .kinds import NUMBER, ArrayKind
 from .slices import Cut, Slices, called, minus, plus
 
@@ -54,6 +54,7 @@ class ArrayEquations(Slices):
                 for k in range(3)
             ]  # fmt: skip
         sizes = self._sizes(target)
+        self._demand_lengths(value, sizes)
         variables = [self._name("i") for _ in sizes]
         places: list[ast.expr] = [ast.Name(v, ast.Load()) for v in variables]
         outer, self._ahead = self._ahead, []
@@ -73,6 +74,51 @@ class ArrayEquations(Slices):
                 if not hasattr(each, "lineno"):
                     ast.copy_location(each, node)
         return body
+
+    def _demand_lengths(self, node: ast.expr, sizes: list[ast.expr]) -> None:
+        """End the run where a slice in a value, whose length only the run knows, is shorter or longer than
+        the loops over its elements."""
+        kind = self._kind(node)
+        if not isinstance(kind, ArrayKind) or not kind.rank or isinstance(node, ast.IfExp):
+            return
+        sizes = sizes[len(sizes) - kind.rank :]
+        if isinstance(node, ast.Attribute) and node.attr == "T":
+            self._demand_lengths(node.value, sizes[::-1])
+        elif isinstance(node, ast.Subscript):
+            self._settle_indices(node)
+            lengths = [each.length for each in indices_of(node) if isinstance(each, Cut)]
+            for size, wanted, length in zip(kind.shape, sizes, lengths, strict=False):
+                if repeats(size) and not isinstance(length, ast.Constant):
+                    wanted = (
+                        wanted if ast.unparse(length) == ast.unparse(wanted) else ast.Constant(1)
+                    )
+                same = ast.unparse(length) == ast.unparse(wanted)
+                if not same and not isinstance(length, ast.Constant):
+                    function = ast.Attribute(ast.Name(NUMBERS, ast.Load()), "demand", ast.Load())
+                    test = ast.Call(function, [copy.deepcopy(length), copy.deepcopy(wanted)], [])
+                    self._scope.setdefault(NUMBERS, numbers())  # type: ignore[attr-defined]  # a module's names
+                    self._put_ahead(ast.Expr(test), node)
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult):
+            self._demand_product(node, sizes)
+        elif not isinstance(node, ast.Name):
+            for each in ast.iter_child_nodes(node):
+                if isinstance(each, ast.expr):
+                    self._demand_lengths(each, sizes)
+
+    def _demand_product(self, node: ast.BinOp, sizes: list[ast.expr]) -> None:
+        """Do so with the factors of a product, which has these sizes."""
+        left, inner = self._kind(node.left), self._inner_size(node)
+        assert isinstance(left, ArrayKind)
+        if inner is not None:
+            rows = left.rank - 1
+            self._demand_lengths(node.left, [*sizes[:rows], inner])
+            self._demand_lengths(node.right, [inner, *sizes[rows:]])
+
+    def _inner_size(self, node: ast.BinOp) -> ast.expr | None:
+        """Return the number of products that each element of a product is the sum of."""
+        left = self._kind(node.left)
+        assert isinstance(left, ArrayKind)
+        return self._size_of(node.left, left.rank - 1) or self._size_of(node.right, 0)
 
     def _settled_target(self, target: ast.Subscript) -> ast.Subscript:
         target = copy.deepcopy(target)
@@ -110,6 +156,7 @@ class ArrayEquations(Slices):
         return self._children(node, lambda each: self._settle(each, target))
 
     def _kept_sum(self, node: ast.BinOp) -> ast.expr:
+        self._demand_product(node, [])
         made = self._sum(node, [])
         assert isinstance(made, ast.Name)
         self._kinds[made.id] = NUMBER
@@ -233,7 +280,7 @@ class ArrayEquations(Slices):
             # a cross product is three numbers, which no index finds
             statements += [each for k in range(3) for each in term(ast.Constant(k))]
         else:
-            size = self._size_of(node.left, left.rank - 1) or self._size_of(node.right, 0)
+            size = self._inner_size(node)
             if size is None:
                 raise self._error(node, "the length of this product is not known")
             j = self._name("j")
@@ -358,7 +405,8 @@ class ArrayEquations(Slices):
             found: list[tuple[str, ...]] = []
             for index in indices_of(whole):
                 if isinstance(index, Cut):
-                    bounds = ast.unparse(index.first), str(index.step), ast.unparse(index.length)
+                    length = ast.unparse(index.length) if index.most is None else str(index.most)
+                    bounds = ast.unparse(index.first), str(index.step), length
                     found.append(bounds)
                 else:
                     found.append((ast.unparse(index),))

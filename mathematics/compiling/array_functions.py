@@ -10,13 +10,12 @@ from __future__ import annotations
 import ast
 import copy
 from collections.abc import Callable, Sequence
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from .array_equations import ArrayEquations
-from .expressions import NUMBERS
+from .expressions import NUMBERS, numbers
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind
 from .slices import called
 
@@ -83,6 +82,8 @@ class ArrayFunctions(ArrayEquations):
         listed = isinstance(node, ast.Call) and self._resolved(node.func) is np.array
         if not listed:
             self._children(node, self._canonical)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            node.func.value = self._canonical(node.func.value)
         if isinstance(node, ast.Call):
             made = self._canonical_call(node)
             if made is not node:
@@ -156,7 +157,7 @@ class ArrayFunctions(ArrayEquations):
     def _number_call(self, node: ast.Call, name: str) -> ast.expr:
         if len(node.args) != _TAKES.get(name, 1):
             return node
-        self._scope.setdefault(NUMBERS, _numbers())  # type: ignore[attr-defined]  # a module's names
+        self._scope.setdefault(NUMBERS, numbers())  # type: ignore[attr-defined]  # a module's names
         return ast.Call(
             ast.Attribute(ast.Name(NUMBERS, ast.Load()), name, ast.Load()), node.args, []
         )
@@ -202,6 +203,7 @@ class ArrayFunctions(ArrayEquations):
         sizes = [self._size_of(value, k) for k in range(kind.rank)]
         if any(size is None for size in sizes):
             raise self._error(node, f"the size of {ast.unparse(value)} is not known")
+        self._demand_lengths(value, [size for size in sizes if size is not None])
         names = {each: self._name(each) for each in ("total", "most", "x", "k")}
         variables = [self._name("i") for _ in sizes]
 
@@ -272,7 +274,7 @@ class ArrayFunctions(ArrayEquations):
 
     def _room(self, node: ast.expr, kind: ArrayKind) -> ast.Name:
         sizes = [size for size in kind.shape if size is not None]
-        if len(sizes) < kind.rank or any(type(size) is not int for size in sizes):
+        if len(sizes) < kind.rank:
             raise self._error(
                 node,
                 f"{ast.unparse(node)[:60]}: this makes a new array: assign it into one, as in scratch.x[:] = ..., "
@@ -285,13 +287,13 @@ class ArrayFunctions(ArrayEquations):
             raise self._error(
                 node, f"an array of {count} elements belongs in Scratch, as in scratch.x[:] = ..."
             )
-        self._scope.setdefault(NUMBERS, _numbers())  # type: ignore[attr-defined]  # a module's names
+        self._scope.setdefault(NUMBERS, numbers())  # type: ignore[attr-defined]  # a module's names
         room = ast.Attribute(ast.Name(NUMBERS, ast.Load()), "room", ast.Load())
         dtype = {float: "float64", int: "int64", bool: "bool"}[kind.element]
-        shape = ast.Tuple([ast.Constant(size) for size in sizes], ast.Load())
+        shape = ast.Tuple([ast.Constant(int(size)) for size in sizes], ast.Load())
         made = self._kept("array", ast.Call(room, [shape, ast.Constant(dtype)], []), node)
         assert isinstance(made, ast.Name)
-        self._kinds[made.id] = kind
+        self._kinds[made.id] = kind._replace(shape=tuple(int(size) for size in sizes))
         self._own.add(made.id)
         return made
 
@@ -409,11 +411,6 @@ class ArrayFunctions(ArrayEquations):
         if self._constant_of(node) is not None:
             return int
         return self._element_type(node)
-
-
-def _numbers() -> Any:
-    """Return the module ``numpy_numbers``, which has kernels and so is imported after what marks them."""
-    return import_module(f"{__package__}.numpy_numbers")
 
 
 def _filled_in(text: str, names: dict[str, str], element: ast.expr | None = None) -> list[ast.stmt]:

@@ -35,7 +35,7 @@ from .kernel_registry import is_kernel, written_code
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kinds
 from .slices import Cut, counters_of
 
-VERSION = 2
+VERSION = 4
 """Counts changes of what a statement is rewritten into: machine code made before is not used."""
 
 
@@ -170,7 +170,13 @@ class _Rewriter(ArrayLoops):
             and self._scope[name] >= 0
         }
         self._counters = counters_of(definition) | constants
-        return self.body(definition.body)
+        body = self.body(definition.body)
+        for statement in body:
+            for each in ast.walk(statement):
+                if isinstance(each, Cut):  # of a call that nothing here knows
+                    text = "this slice stands where no element of it is read; assign it to a name before"
+                    raise self._error(each, text)
+        return body
 
     def body(self, statements: Sequence[ast.stmt]) -> list[ast.stmt]:
         """Rewrite some statements that follow each other."""
@@ -408,6 +414,7 @@ class _Rewriter(ArrayLoops):
             if isinstance(self._kind(node), NumberKind):
                 node = self._without_cross(node)
                 assert isinstance(node, ast.BinOp)
+                self._demand_product(node, [])
                 return self._sum(node, [])
             raise self._error(node, "a product with @ is an array: assign it, as in out[:] = R @ v")
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):

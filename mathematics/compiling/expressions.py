@@ -5,13 +5,23 @@ from __future__ import annotations
 import ast
 import copy
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Array
 from .kernel_registry import written_code
-from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kinds
+from .kinds import (
+    NUMBER,
+    ArrayKind,
+    GreatestLength,
+    Kind,
+    NumberKind,
+    RecordKind,
+    RuntimeSize,
+    argument_kinds,
+)
 
 
 class EquationError(Exception):
@@ -150,7 +160,10 @@ class Expressions:
         ):
             if None not in (one, other) and one != other and not (repeats(one) or repeats(other)):
                 raise self._error(node, f"shapes {shown(a)} and {shown(b)} do not fit together")
-            made.append(other if repeats(one) or one is None else one)
+            if repeats(one) or repeats(other):
+                made.append(other if repeats(one) else one)
+            else:  # what is certain before what may be cut, and that before what is open
+                made.append(max(one, other, key=_certainty))
         return tuple(made)
 
     def _without_number(self, node: ast.expr) -> Kind:
@@ -278,7 +291,7 @@ class Expressions:
         if not isinstance(kind, ArrayKind) or kind.rank == 0:
             return None
         known = kind.shape[dimension]
-        if known is not None:
+        if known is not None and not isinstance(known, GreatestLength):
             return ast.copy_location(ast.Constant(known), node)
         if isinstance(node, ast.Attribute) and node.attr == "T":
             return self._size_of(node.value, kind.rank - 1 - dimension)
@@ -288,11 +301,23 @@ class Expressions:
             shape = ast.Attribute(self._inside(copy.deepcopy(node)), "shape", ast.Load())
             part = ast.Subscript(shape, ast.Constant(dimension), ast.Load())
             return ast.copy_location(part, node)
-        for each in ast.iter_child_nodes(node):
-            if isinstance(each, ast.expr):
-                size = self._size_of(each, dimension)
-                if size is not None:
-                    return size
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult):
+            left = self._kind(node.left)
+            assert isinstance(left, ArrayKind)
+            if dimension < left.rank - 1:
+                return self._size_of(node.left, dimension)
+            return self._size_of(node.right, 1)
+        parts = [each for each in ast.iter_child_nodes(node) if isinstance(each, ast.expr)]
+        for repeated in (False, True):
+            for each in parts:
+                found = self._kind(each)
+                place = dimension - kind.rank + (found.rank if isinstance(found, ArrayKind) else 0)
+                if (
+                    isinstance(found, ArrayKind)
+                    and place >= 0
+                    and repeats(found.shape[place]) == repeated
+                ):
+                    return self._size_of(each, place)
         return None
 
     def _size_of_part(self, node: ast.Subscript, dimension: int) -> ast.expr | None:
@@ -329,7 +354,11 @@ def is_slice(index: ast.expr) -> bool:
 def repeats(size: int | None) -> bool:
     """Return whether a dimension of one element stands for all places of another's; one whose size
     only a call tells is not repeated."""
-    return size == 1 and type(size) is int
+    return size == 1 and not isinstance(size, RuntimeSize)
+
+
+def _certainty(size: int | None) -> int:
+    return 0 if size is None else 1 if isinstance(size, GreatestLength) else 2
 
 
 def shown(shape: Sequence[int | None]) -> str:
@@ -346,3 +375,8 @@ KEEPING = ("maximum", "minimum", "clip", "sign")
 """Those that answer with a whole number for whole numbers."""
 NUMBERS = "__aloft_numbers__"
 """Name in a kernel's module under which ``numpy_numbers`` stands for rewritten code."""
+
+
+def numbers() -> Any:
+    """Return the module ``numpy_numbers``, which has kernels and so is imported after what marks them."""
+    return import_module(f"{__package__}.numpy_numbers")

@@ -13,7 +13,8 @@ class Failure(IntEnum):
     TOO_LARGE = 1
     DOMAIN = 2
     RANGE = 3
-    NUMBA = 4
+    SLICE = 4
+    NUMBA = 5
 
 
 FAILURES: dict[Failure, tuple[type[Exception], str]] = {
@@ -22,6 +23,7 @@ FAILURES: dict[Failure, tuple[type[Exception], str]] = {
     Failure.DOMAIN: (ValueError, "called a function outside of its domain"),
     Failure.RANGE: (OverflowError, "got a number beyond the largest float"),
     Failure.NUMBA: (RuntimeError, "called a numba function that raised an error"),
+    Failure.SLICE: (IndexError, "met a slice of another length than what it is combined with"),
 }
 """The error that Python would raise, and what is said of the kernel."""
 

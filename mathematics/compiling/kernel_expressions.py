@@ -329,11 +329,14 @@ class ExpressionTranslator:
         if not self._is_outer(node.func):
             raise NotCompilable(f"{ast.unparse(node.func)} is {_NOT_CALLED}")
         function = self._outer(node.func)
-        if (
-            getattr(function, "__module__", "").endswith(".compiling.numpy_numbers")
-            and function.__name__ == "room"
-        ):
-            return self._room(node)
+        if getattr(function, "__module__", "").endswith(".compiling.numpy_numbers"):
+            if function.__name__ == "room":
+                return self._room(node)
+            if function.__name__ == "demand":
+                found, wanted = (self._value(each) for each in node.args)
+                differ = self._code.compare("NotEq", found, wanted)
+                self._code.fail_if(differ.parts[0], Failure.SLICE)
+                return NOTHING
         arguments = [self._value(each) for each in node.args]
         try:
             if function in FUNCTIONS:

@@ -13,6 +13,14 @@ from ..arrays import Rank
 from .kernel_registry import arguments_of
 
 
+class RuntimeSize(int):
+    """A size that the declarations leave open, as one call has it."""
+
+
+class GreatestLength(int):
+    """The length of a slice whose end may lie beyond its array, where it is shorter."""
+
+
 class ArrayKind(NamedTuple):
     """An array: the size of each dimension where it is known, and the type of an element.
 

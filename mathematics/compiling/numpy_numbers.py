@@ -21,6 +21,12 @@ def room(shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
     return np.zeros(shape, dtype)
 
 
+def demand(size: int, wanted: int) -> None:
+    """Raise an error where a slice has another length than what it is combined with."""
+    if size != wanted:
+        raise IndexError(f"a slice of {size} elements stands where {wanted} are needed")
+
+
 @kernel
 def maximum(a: float, b: float) -> float:
     return a if a >= b or math.isnan(a) else b

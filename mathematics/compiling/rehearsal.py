@@ -21,7 +21,7 @@ from .failures import FAILURES
 from .fingerprint import numba_functions
 from .kernel_call import KernelCall
 from .kernel_registry import written_code
-from .kinds import ArrayKind, Kind, RecordKind, argument_kinds
+from .kinds import ArrayKind, Kind, RecordKind, RuntimeSize, argument_kinds
 from .numba_calls import unseeded
 from .translate import Translator
 
@@ -30,10 +30,6 @@ MOST_LINES = 100_000
 _MISTAKES = (IndexError, AttributeError, TypeError, NameError, KeyError)
 _SHAPES = ("broadcast", "shape", "sequence", "dimension", "unpack")
 """Words in the errors by which NumPy refuses sizes."""
-
-
-class Found(int):
-    """A size that the declarations leave open, as one call has it."""
 
 
 class _Enough(BaseException):
@@ -114,7 +110,7 @@ def _kind_of(value: Any, declared: Kind) -> Kind:
         and value.ndim == declared.rank
     ):
         pairs = zip(declared.shape, value.shape, strict=True)
-        shape = tuple(Found(found) if size is None else size for size, found in pairs)
+        shape = tuple(RuntimeSize(found) if size is None else size for size, found in pairs)
         return declared._replace(shape=shape)
     if isinstance(value, tuple) and isinstance(declared, RecordKind):
         parts: Mapping[str, Kind] = {
@@ -184,7 +180,7 @@ def _place_of(error: Exception | None, file: str) -> str:
     place, frame = file, error.__traceback__ if error is not None else None
     while frame is not None:
         name = frame.tb_frame.f_code.co_filename
-        if "rehearsal" not in name:
+        if not name.endswith(("compiling/rehearsal.py", "compiling/numpy_numbers.py")):
             place = f"{name}:{frame.tb_lineno}"
         frame = frame.tb_next
     return place

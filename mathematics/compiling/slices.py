@@ -8,20 +8,26 @@ from collections.abc import Callable
 from enum import IntEnum
 
 from .expressions import Expressions, indices_of
-from .kinds import ArrayKind
+from .kinds import ArrayKind, GreatestLength, RuntimeSize
 
 
 class Cut(ast.expr):
-    """A slice in place of an ``ast.Slice``: place k of it is element ``first + step * k``."""
+    """A slice in place of an ``ast.Slice``: place k of it is element ``first + step * k``.
+
+    Attributes:
+        most: its length, unless its array ends before; ``None`` where that is not known.
+    """
 
     _fields = ("first", "length")
 
-    def __init__(self, first: ast.expr, step: int, length: ast.expr) -> None:
+    def __init__(
+        self, first: ast.expr, step: int, length: ast.expr, most: int | None = None
+    ) -> None:
         super().__init__()
-        self.first, self.step, self.length = first, step, length
+        self.first, self.step, self.length, self.most = first, step, length, most
 
     def __deepcopy__(self, memo: object) -> Cut:
-        made = Cut(copy.deepcopy(self.first), self.step, copy.deepcopy(self.length))
+        made = Cut(copy.deepcopy(self.first), self.step, copy.deepcopy(self.length), self.most)
         return ast.copy_location(made, self)
 
 
@@ -70,6 +76,7 @@ class Slices(Expressions):
 
     def _cut(self, part: ast.Slice, size: int | None, node: ast.Subscript, dimension: int) -> Cut:
         """Find the places of a slice in a dimension of ``size`` elements, or of as many as there are."""
+        size = None if isinstance(size, GreatestLength) else size
         key = f"{ast.dump(part)} {ast.dump(node.value)} {dimension}"
         if key not in self._cuts:
             self._cuts[key] = self._new_cut(part, size, node, dimension)
@@ -92,42 +99,36 @@ class Slices(Expressions):
             part.upper is None or upper is not None
         )
         if known and size is not None:
-            most = max(b for b in (lower, upper, 0) if b is not None)
-            if type(size) is not int and step == 1 and most > size:
-                text = f"{ast.unparse(node)} reaches beyond {ast.unparse(node.value)}, which has {int(size)} elements"
-                raise self._error(node, text)
             places = range(*slice(lower, upper, step).indices(size))
             bounds = Cut(ast.Constant(places.start), step, ast.Constant(len(places)))
         else:
             bounds = (
-                self._simple_cut(part, lower, upper, size, node, dimension) if step == 1 else None
-            ) or (self._general_cut(part, step, node, dimension))
+                self._simple_cut(part, lower, upper, node, dimension) if step == 1 else None
+            ) or self._general_cut(part, step, node, dimension)
+            most = self._length_of(part, size)
+            bounds.most = None if most is None else int(most)
         for each in ast.walk(bounds):
             if not hasattr(each, "lineno"):
                 ast.copy_location(each, node)
         return bounds
 
     def _simple_cut(
-        self, part: ast.Slice, lower: int | None, upper: int | None, size: int | None,
-        node: ast.Subscript, dimension: int,
+        self, part: ast.Slice, lower: int | None, upper: int | None, node: ast.Subscript, dimension: int
     ) -> Cut | None:  # fmt: skip
         """Find the places of a slice whose bounds cannot be negative; ``None`` for other slices."""
         if part.lower is not None and not self._is_count(part.lower):
             return None
         first = ast.Constant(0) if part.lower is None else self._bound(part.lower, lower)
         length: ast.expr
+        whole = self._size_of(node.value, dimension)
+        if whole is None:
+            raise self._error(node, "say where this slice ends")
         if part.upper is None or (upper is not None and upper < 0):
-            whole = self._size_of(node.value, dimension)
-            if whole is None:
-                raise self._error(node, "say where this slice ends")
             back = first if upper is None else plus(copy.deepcopy(first), ast.Constant(-upper))
             length = minus(whole, copy.deepcopy(back))
-        elif (more := self._more_than(part.lower, part.upper)) is not None:
-            length = ast.Constant(max(more, 0))
         elif self._is_count(part.upper):
-            if upper is not None and size is not None:
-                upper = min(upper, size)
-            length = minus(self._bound(part.upper, upper), copy.deepcopy(first))
+            last = called("min", self._bound(part.upper, upper), whole)
+            length = minus(last, copy.deepcopy(first))
         else:
             return None
         return Cut(first, 1, length)
@@ -168,30 +169,50 @@ class Slices(Expressions):
     def _length_of(self, part: ast.expr, size: int | None) -> int | None:
         """Return the length of a slice where it is known."""
         if isinstance(part, Cut):
-            return part.length.value if isinstance(part.length, ast.Constant) else None  # type: ignore[return-value]  # a number
+            if isinstance(part.length, ast.Constant):
+                return part.length.value  # type: ignore[return-value]  # a number
+            return None if part.most is None else GreatestLength(part.most)
         assert isinstance(part, ast.Slice)
+        size = None if isinstance(size, GreatestLength) else size
         bounds = [None if b is None else self._constant_of(b) for b in (part.lower, part.upper)]
         step = 1 if part.step is None else self._constant_of(part.step)
         known = all(b is None or c is not None for b, c in zip((part.lower, part.upper), bounds, strict=True))  # fmt: skip
         if known and size is not None and step:
-            return len(range(*slice(bounds[0], bounds[1], step).indices(size)))
-        if step == 1 and part.upper is not None:
-            more = self._more_than(part.lower, part.upper)
-            if more is not None and (part.lower is None or self._is_count(part.lower)):
-                return max(more, 0) if bounds[1] is None or bounds[1] >= 0 else None
-        return None
+            length = len(range(*slice(bounds[0], bounds[1], step).indices(size)))
+            return RuntimeSize(length) if isinstance(size, RuntimeSize) else length
+        if step != 1 or part.upper is None:
+            return None
+        more, constants = (
+            self._more_than(part.lower, part.upper),
+            [b for b in bounds if b is not None],
+        )
+        if more is None or (
+            constants and min(constants) < 0 <= max(*constants, 0 if part.lower is None else -1)
+        ):
+            return None  # one counts from the end, the other from the beginning
+        return GreatestLength(more) if more > 0 else 0
 
     def _more_than(self, lower: ast.expr | None, upper: ast.expr) -> int | None:
-        """By how much one bound is above the other, where that is known: 3 of ``k`` and ``k + 3``."""
-        last = self._constant_of(upper)
-        first = 0 if lower is None else self._constant_of(lower)
-        if last is not None and first is not None:
-            return last - first
-        if lower is not None and isinstance(upper, ast.BinOp) and isinstance(upper.op, ast.Add):
-            for one, other in ((upper.left, upper.right), (upper.right, upper.left)):
-                if ast.dump(one) == ast.dump(lower):
-                    return self._constant_of(other)
-        return None
+        """By how much one bound is above the other, where that is known: 2 of ``k + 1`` and ``k + 3``."""
+        first, begin = ("", 0) if lower is None else self._offset(lower)
+        last, end = self._offset(upper)
+        return end - begin if first == last else None
+
+    def _offset(self, node: ast.expr) -> tuple[str, int]:
+        """Split an expression into what is not known and a number: ``k`` and 3 of ``k + 3``."""
+        constant = self._constant_of(node)
+        if constant is not None:
+            return "", constant
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub):
+            number = self._constant_of(node.right)
+            if number is not None:
+                base, more = self._offset(node.left)
+                return base, more + number if isinstance(node.op, ast.Add) else more - number
+            number = self._constant_of(node.left)
+            if number is not None and isinstance(node.op, ast.Add):
+                base, more = self._offset(node.right)
+                return base, more + number
+        return ast.dump(node), 0
 
     def _constant_of(self, node: ast.expr) -> int | None:
         """Return the whole number that an expression always is; ``None`` where that is not known."""
@@ -236,7 +257,8 @@ class Slices(Expressions):
     def _known_size(self, array: ast.expr, dimension: int) -> int | None:
         kind = self._kind(array)
         if isinstance(kind, ArrayKind) and dimension < kind.rank:
-            return kind.shape[dimension]
+            size = kind.shape[dimension]
+            return None if isinstance(size, GreatestLength) else size
         return None
 
     def _is_count(self, node: ast.expr) -> bool:

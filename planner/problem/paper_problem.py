@@ -27,7 +27,8 @@ The solutions are the same, and the problem has the order in time that fatrop wa
 ``stance``   z = x, u.  Rows: integration of q, r, rdot, h; linear momentum rate (3), momentum h =
              A(q) v (3), friction cone (a row a contact point).
 ``flight``   the same without F.
-``posture``  z = x.     Rows: r - f_com(q) (3), f_contact(q) - c (5 a line foot).
+``posture``  z = x.     Rows: r - f_com(q) (3), f_contact(q) - c along, across and up (3 a contact point). Of the
+             points of a foot that are on the ground only the first has a row along it, as their distances are fixed.
 ``attitude`` z = quaternion.  Rows: the turn from the wanted one (3).
 """
 
@@ -150,15 +151,12 @@ def _posture(model: SymbolicModel, x: Any, w: Any) -> tuple[Any, Any]:
 
     n = model.size + 1
     q, heading = x[:n], w["heading"]
-    rows, seen = [x[n : n + 3] - centroidal.com(model, q)], set()
+    rows = [x[n : n + 3] - centroidal.com(model, q)]
     for j, point in enumerate(centroidal.contact_points(model, q)):
         off = point - w["place"][3 * j : 3 * j + 3]
         along = heading[0] * off[0] + heading[1] * off[1]
         across = heading[0] * off[1] - heading[1] * off[0]
-        foot = model.robot.contacts[j].foot
-        # The two points of a line foot have a fixed distance: one "along" says it all.
-        rows += [across, off[2]] if foot in seen else [along, across, off[2]]
-        seen.add(foot)
+        rows += [along, across, off[2]]
     return ca.SX(0), ca.vertcat(*rows)
 
 
@@ -188,7 +186,7 @@ class PaperProblemBuilder:
         self.task, self.model, self.pieces = task, model, pieces
         self.start, self.end = start, end
         self.up, flight_time = ballistic_flight(task, backward_steps=task.knots.flight)
-        self.grid: Grid = uniform_grid(task, flight_time)
+        self.grid: Grid = uniform_grid(task, model.robot, flight_time)
         self.nq, self.nv = model.size + 1, model.size
         self.nx = state_size(model)
         self.forces = 3 * len(model.robot.contacts)
@@ -208,9 +206,30 @@ class PaperProblemBuilder:
         self._fix()
         return self.fill.done(self.task, self.model, self.grid, self.start, self.end)
 
-    def _in_contact(self, k: int) -> bool:
-        """Check whether the feet are on the ground at a knot; at the last one that follows from rest."""
-        return 0 < k <= self.lift_off or self.touchdown <= k < self.last
+    def _on_ground(self, k: int) -> tuple[int, ...]:
+        """Return the contact points on the ground at a knot, those of the intervals before and after it; none at the last
+        one, where that follows from rest."""
+        if k in (0, self.last):
+            return ()
+        return tuple(sorted({*self.grid.on_ground[k - 1], *self.grid.on_ground[k]}))
+
+    def _raised(self, k: int) -> tuple[int, ...]:
+        """Return the contact points of interval k that are off the ground while others bear load."""
+        loaded = self.grid.on_ground[k]
+        return tuple(j for j in range(self.forces // 3) if loaded and j not in loaded)
+
+    def _foothold_rows(self, k: int) -> list[tuple[int, bool]]:
+        """Return the posture's rows of contact points at a knot, and whether each holds its point or keeps it from
+        passing through the ground."""
+        on_ground, feet, found = self._on_ground(k), set(), list[tuple[int, bool]]()
+        for j, contact in enumerate(self.model.robot.contacts):
+            if j in on_ground:
+                first = 3 + 3 * j + (contact.foot in feet)
+                found += [(row, True) for row in range(first, 6 + 3 * j)]
+                feet.add(contact.foot)
+            elif on_ground:
+                found.append((5 + 3 * j, False))
+        return found
 
     def _knots(self) -> list[Knot]:
         every = np.arange(self.nx)
@@ -220,10 +239,17 @@ class PaperProblemBuilder:
             controls = self.nv + 3 + (0 if phase is Phase.FLIGHT else self.forces)
             knot = Knot(self.nx, controls, gap=name)
             take = np.arange(self.nx + controls)
-            knot.pieces[name] = (take, np.arange(self.nx, self.pieces[name].rows))
+            rows = self.pieces[name].rows
+            if name == "stance":  # the cones are its last rows
+                raised = [rows - self.forces // 3 + j for j in self._raised(k)]
+                kept = np.setdiff1d(np.arange(self.nx, rows), np.array(raised, dtype=np.int64))
+            else:
+                kept = np.arange(self.nx, rows)
+            knot.pieces[name] = (take, kept)
             if k > 0:
-                rows = self.pieces["posture"].rows if self._in_contact(k) else 3
-                knot.pieces["posture"] = (every, np.arange(rows))
+                held = [row for row, _ in self._foothold_rows(k)]
+                knot.pieces["posture"] = (every, np.array([0, 1, 2, *held]))
+            knot.fixed = self._raised_forces(k)
             knots.append(knot)
         knots[0].fixed = tuple(range(self.nx))
         speed = self.nq + 3
@@ -234,6 +260,12 @@ class PaperProblemBuilder:
         end.pieces["attitude"] = (np.arange(3, 7), np.arange(3))
         return [*knots, end]
 
+    def _raised_forces(self, k: int) -> tuple[int, ...]:
+        """Return the variables of knot k that are the forces of raised points. There are none at both ends, where the
+        robot stands on all points."""
+        first = self.nx + self.nv + 3
+        return tuple(first + 3 * j + axis for j in self._raised(k) for axis in range(3))
+
     def _fix(self) -> None:
         """Fix Q: standing still at the start, the velocity at lift-off, at rest in place at the end."""
         flight = float(self.grid.steps[self.grid.flight].sum())
@@ -242,6 +274,9 @@ class PaperProblemBuilder:
         self.fill.fix(self.lift_off, "take-off speed", [self.start.com[2], *across, self.up])
         self.fill.fix(self.last - 1, "stance", np.zeros(self.nv))
         self.fill.fix(self.last, "stance", self.q_end[:3])
+        for k in range(1, self.last - 1):
+            if self._raised(k):
+                self.fill.fix(k, "friction", np.zeros(len(self._raised_forces(k))))
 
     def _at_rest(self, q: Array, com: Array) -> Array:
         return np.concatenate([q, com, np.zeros(6)])
@@ -328,7 +363,7 @@ class PaperProblemBuilder:
         if name == "stance":
             common |= {"Q_f": FORCE_SCALE * weights.force, "friction": self.task.friction,
                        "place": self._stance_at(k + 1).points.ravel()}  # fmt: skip
-            rates.append(("friction", self.forces // 3, 0.0, np.inf))
+            rates.append(("friction", self.forces // 3 - len(self._raised(k)), 0.0, np.inf))
         self._bound_controls(k)
         self.fill.set(name, k, **common)
         self.fill.rows(name, k, rates)
@@ -340,9 +375,12 @@ class PaperProblemBuilder:
         stance = self._stance_at(k)
         heading = [np.cos(stance.heading), np.sin(stance.heading)]
         self.fill.set("posture", k, place=stance.points.ravel(), heading=heading)
-        held = [("footholds", self.pieces["posture"].rows - 3, 0.0, 0.0)]
-        com = [("centre of mass", 3, 0.0, 0.0)]
-        self.fill.rows("posture", k, com + (held if self._in_contact(k) else []))
+        families = [("centre of mass", 3, 0.0, 0.0)]
+        for _, holds in self._foothold_rows(k):
+            families.append(
+                ("footholds", 1, 0.0, 0.0) if holds else ("ground clearance", 1, 0.0, np.inf)
+            )
+        self.fill.rows("posture", k, families)
 
     def _fill_attitude(self, k: int) -> None:
         self.fill.set("attitude", k, wanted=self.q_end[3:7])
@@ -374,6 +412,6 @@ class PaperProblemBuilder:
             self.fill.guess[control + 3 : control + 6] = turn[[4, 3, 5]]
             self.fill.guess[control + self.nv + 2] = -GRAVITY
             return
-        share = self.model.robot.weight * 3.0 / self.forces
-        begin = control + self.nv + 3
-        self.fill.guess[begin + 2 : begin + self.forces : 3] = share
+        loaded, begin = self.grid.on_ground[k], control + self.nv + 3
+        for j in loaded:
+            self.fill.guess[begin + 3 * j + 2] = self.model.robot.weight / len(loaded)

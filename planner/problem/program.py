@@ -11,12 +11,14 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
+from ...robots.description import RobotDescription
 from ..models.exact_dynamics import ExactDynamics, half_steps, joint_motions
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.boundary_set import unsupported_keys
 from ..task.files import PlanError
 from ..task.phase import Phase
+from ..task.sequence import PHASES
 from ..task.task import JumpTask
 from .assembly import Assembly, Knot, NonlinearProgram
 from .stage_functions import StageFunction
@@ -30,11 +32,13 @@ class Grid:
         phases: of every interval.
         steps: the intervals' lengths [s].
         flight: the knots in flight, lift-off to the one before touchdown.
+        on_ground: the contact points that bear load in every interval.
     """
 
     phases: tuple[Phase, ...]
     steps: Array
     flight: range
+    on_ground: tuple[tuple[int, ...], ...]
 
     @property
     def times(self) -> Array:
@@ -42,33 +46,41 @@ class Grid:
         return np.concatenate([[0.0], np.cumsum(self.steps)])
 
 
-def uniform_grid(task: JumpTask, flight_time: float) -> Grid:
+def uniform_grid(task: JumpTask, robot: RobotDescription, flight_time: float) -> Grid:
     """Return intervals of equal length within every phase, as the paper's fixed dt.
 
     Raises:
         PlanError: the task asks for what only ``formulation: full`` can do.
     """
     check_supported(task)
-    knots = task.knots
-    parts = (
-        (Phase.SQUAT, knots.squat, task.squat_time or 0.0),
-        (Phase.THRUST, knots.thrust, task.thrust_time or 0.0),
-        (Phase.FLIGHT, knots.flight, flight_time),
-        (Phase.LANDING, knots.landing, task.landing_time or 0.0),
+    phases, steps, on_ground = list[Phase](), list[Array](), list[tuple[int, ...]]()
+    for spec in task.phase_specs():
+        phase, count = PHASES[spec.phase], spec.knots or 0
+        time = flight_time if phase is Phase.FLIGHT else spec.time or 0.0
+        loaded = spec.on_ground(robot)
+        if phase is not Phase.FLIGHT and not loaded:
+            raise PlanError(
+                f"{task.name}: no contact point is on the ground in a phase {spec.phase!r}",
+                family="formulation",
+            )
+        phases += [phase] * count
+        steps.append(np.full(count, time / count))
+        on_ground += [loaded] * count
+    before, flying = phases.index(Phase.FLIGHT), phases.count(Phase.FLIGHT)
+    return Grid(
+        tuple(phases), np.concatenate(steps), range(before, before + flying), tuple(on_ground)
     )
-    phases = [phase for phase, count, _ in parts for _ in range(count)]
-    steps = np.concatenate([np.full(count, time / count) for _, count, time in parts])
-    before = knots.squat + knots.thrust
-    return Grid(tuple(phases), steps, range(before, before + knots.flight))
 
 
 def check_supported(task: JumpTask) -> None:
     """Raise ``PlanError`` for free times and for every key of the task that the formulation has nothing for."""
-    asked = []
-    for name in ("squat_time", "thrust_time", "landing_time"):
-        if getattr(task, name) is None:
-            asked.append(f"{name}: free")
-    asked += unsupported_keys(task)
+    asked = list(unsupported_keys(task))
+    if not asked:
+        asked = [
+            f"{spec.phase}_time: free"
+            for spec in task.phase_specs()
+            if spec.phase != "flight" and spec.time is None
+        ]
     if asked:
         raise PlanError(
             f"{task.name}: formulation {task.formulation!r} plans one flight with given times and "
@@ -84,7 +96,8 @@ def ballistic_flight(task: JumpTask, *, backward_steps: int = 0) -> tuple[float,
     faster than the exact parabola: g T^2 (1 + 1/n) / 2.
     """
     fall = 0.5 * GRAVITY * (1.0 + (1.0 / backward_steps if backward_steps else 0.0))
-    height, time = task.landing_height, task.flight_time
+    flight = next(spec for spec in task.phase_specs() if spec.phase == "flight")
+    height, time = task.landing_height, flight.time
     if task.rise is not None:
         up = math.sqrt(2.0 * GRAVITY * task.rise)
     elif task.take_off_speed is not None:

@@ -141,7 +141,9 @@ class RigidBodyProblemBuilder:
     ) -> None:
         self.task, self.model, self.pieces, self.body = task, model, pieces, body
         self.start, self.end = start, end
-        self.grid = uniform_grid(task, float(task.knots.flight))  # lengths in units of their mean
+        self.grid = uniform_grid(
+            task, model.robot, float(task.knots.flight)
+        )  # lengths in units of their mean
         self.up, self.flight_time = ballistic_flight(task)
         self.flight = self.grid.flight
         self.last = len(self.grid.phases)

@@ -16,7 +16,6 @@ from ...robots.welding import WeldedRobot
 from ..models.exact_dynamics import ExactDynamics
 from ..problem.program import SimpleProblem, joint_torques
 from ..task.files import PlanError
-from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.task import JumpTask
 from .solver import Solution
@@ -50,7 +49,6 @@ def statistics_of(problem: SimpleProblem, solution: Solution) -> dict[str, Any]:
         "knots": problem.knots,
         "variables": problem.assembly.variables,
         "constraints": problem.assembly.constraints,
-        "compiled": not problem.assembly.interpreted,
     }
 
 
@@ -90,8 +88,10 @@ def motion_arrays(
     times = np.concatenate([[0.0], np.cumsum(steps)])
     acceleration = np.diff(velocity, axis=0) / steps[:, None]
     phases = [*problem.grid.phases, problem.grid.phases[-1]]
-    contact = np.array([phase != Phase.FLIGHT for phase in phases])
     forces = force.reshape(len(times), -1, 3)
+    contact = np.zeros(forces.shape[:2], dtype=bool)
+    for k, loaded in enumerate([*problem.grid.on_ground, problem.grid.on_ground[-1]]):
+        contact[k, list(loaded)] = True
     dynamics = ExactDynamics(problem.model.robot)
     return {
         "time": times,
@@ -99,7 +99,7 @@ def motion_arrays(
         "velocity": velocity,
         "acceleration": np.vstack([acceleration, acceleration[-1:]]),
         "contact_force": forces,
-        "contact": np.repeat(contact[:, None], forces.shape[1], axis=1),
+        "contact": contact,
         "phase": np.array([int(phase) for phase in phases], dtype=np.int64),
         "joint_torque": joint_torques(dynamics, times, position, velocity, forces),
     }

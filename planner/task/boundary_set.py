@@ -31,13 +31,13 @@ class BoundarySet(Parameters):
 
 _FULL_ONLY = (
     "impact", "effort", "foot_clearance", "leg_clearance", "gap", "step_edge", "slope", "landing_slope", "rough",
-    "stairs", "jumps", "repeat", "phases", "take_off", "touchdown", "contact_time", "weights.acceleration",
+    "stairs", "jumps", "repeat", "contact_time", "weights.acceleration",
     "weights.impulse", "margins.step", "margins.pressure", "margins.load", "margins.lift_off_speed",
     "margins.touchdown_speed", "margins.touchdown_slide", "margins.landing_effort",
 )  # fmt: skip
 _PAPER_TOO = (
     "margins.squat_lean", "margins.landing_lean", "margins.joints", "margins.landing_limits", "touchdown_lean",
-    "lift_off_momentum", "touchdown_momentum",
+    "lift_off_momentum", "touchdown_momentum", "phases", "take_off", "touchdown",
 )  # fmt: skip
 UNSUPPORTED: dict[str, tuple[str, ...]] = {
     "full": ("bounds",),  # it has the motors themselves

@@ -63,6 +63,10 @@ def read_model(path: Path) -> RawModel:
     if file.is_urdf:
         check_urdf(file)
     notes, remarks = list[str](), list[str]()
+    if file.hangs_from_world:
+        notes.append(
+            "a joint hangs from the link world, which the URDF does not declare: it is the ground, as in Drake"
+        )
     with mujoco_remarks(remarks):
         spec, untouched = _parsed(file), _parsed(file)
     _refuse_closed_loops(spec, file)
@@ -150,7 +154,7 @@ def _parsed(file: XmlFile) -> Any:
     import mujoco
 
     try:
-        if file.path.suffix == XACRO:
+        if file.path.suffix == XACRO or file.hangs_from_world:
             spec = mujoco.MjSpec.from_string(file.content)
         else:
             spec = mujoco.MjSpec.from_file(str(file.path))

@@ -48,6 +48,7 @@ class XmlFile:
             self._check_encoding(text)
             self.root = ElementTree.fromstring(text)
             self.content = text
+            self.hangs_from_world = self._add_world()
             # Comments are blanked: nothing is found in them, and all other positions stay.
             self.text = re.sub(r"<!--.*?-->", _blanked, text, flags=re.DOTALL)
         except OSError as error:
@@ -65,6 +66,20 @@ class XmlFile:
                 "the root element <robot> of a URDF or <mujoco> of an MJCF file",
                 f"<{self.root.tag}>",
             )
+
+    def _add_world(self) -> bool:
+        """Add a link ``world`` where a joint hangs from it and the URDF has none, as Drake welds a robot to its world. Return
+        whether that was so."""
+        parents = [joint.find("parent") for joint in self.root.findall("joint")]
+        hangs = any(parent is not None and parent.get("link") == WORLD for parent in parents)
+        if not self.is_urdf or not hangs or self.has("link", WORLD):
+            return False
+        self.root.insert(0, ElementTree.Element("link", name=WORLD))
+        # Behind the root's tag, on its line: all other lines stay.
+        self.content = re.sub(
+            r"<robot\b[^>]*>", rf'\g<0><link name="{WORLD}"/>', self.content, count=1
+        )
+        return True
 
     def _check_encoding(self, text: str) -> None:
         """Raise ``RobotError`` where the text, read as UTF-8, is another one in the encoding that it declares."""
@@ -102,6 +117,10 @@ class XmlFile:
             return 0, 0
         before = self.text[: found.start()]
         return before.count("\n") + 1, found.start() - before.rfind("\n")
+
+
+WORLD = "world"
+"""The link from which a robot hangs that is welded to the ground, in Drake without being declared."""
 
 
 def _blanked(comment: re.Match[str]) -> str:

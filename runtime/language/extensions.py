@@ -58,6 +58,13 @@ SERVICES: Mapping[str, str] = {
 FROM_SOURCE = "install aloft from a clone of its repository instead: pip install --editable ."
 
 _PACKAGE = __name__.rpartition(".runtime.")[0]
+
+
+def is_own(module: str) -> bool:
+    """Return whether a module is aloft's own, which its tests check, and no user's."""
+    return module.startswith(f"{_PACKAGE}.")
+
+
 _ROOT = Path(__file__).parents[2]
 
 

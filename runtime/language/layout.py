@@ -24,11 +24,13 @@ ALIGNMENT = 64
 
 @dataclass(frozen=True)
 class PortLayout:
-    """A port that needs memory: its full name ``block.port``, its signal and its dimensions."""
+    """A port that needs memory: its full name ``block.port``, its signal, its dimensions, and the fields of
+    general vectors that carry quaternions."""
 
     name: str
     signal: type[Signal]
     dimensions: Mapping[str, int]
+    quaternions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,7 @@ class Layout:
             f"{port.name}.{name}"
             for port in ports
             for name, field in port.signal.fields.items()
-            if field.quaternion
+            if field.quaternion or name in port.quaternions
         ]
         size = 0
         for section, length in lengths.items():

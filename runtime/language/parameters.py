@@ -137,6 +137,10 @@ class Parameters(BaseModel):
         """Return the kind of each parameter in the equations of a kernel."""
         return parameter_kinds(cls)
 
+    def own_unit(self, name: str) -> str:
+        """Return the unit that the graph gives a parameter; empty where its declaration says all."""
+        return ""
+
     @model_validator(mode="before")
     @classmethod
     def _read_values(cls, data: Any) -> Any:

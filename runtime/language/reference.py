@@ -7,13 +7,16 @@ disagree with the code.
 from __future__ import annotations
 
 import inspect
+import re
 import types
 from dataclasses import asdict, dataclass
+from pathlib import PurePath
 from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from ...files.nodes import text_of
 from ...files.validation import unit_of
 from .block import Block, Input, Output, Port
 from .parameters import declared_fields, is_live
@@ -67,6 +70,10 @@ class BlockReference:
     """The docstring's first sentence or paragraph, on one line."""
     text: str
     """The whole docstring."""
+    module: str
+    """The module of its class, below the package."""
+    example: str
+    """Lines of a graph file that have it, with its required inputs and parameters."""
     machine: str
     """``Mealy`` (outputs follow inputs in the same tick) or ``Moore`` (they follow from state)."""
     inputs: tuple[PortReference, ...]
@@ -86,6 +93,8 @@ def block_reference(name: str, block_type: type[Block]) -> BlockReference:
         name=name,
         summary=" ".join(text.partition("\n\n")[0].split()).rstrip(":"),
         text=text,
+        module=block_type.__module__.removeprefix("aloft."),
+        example=example_lines(name, block_type),
         machine="Moore" if block_type.is_moore() else "Mealy",
         inputs=tuple(_port(port) for port in block_type.inputs.values()),
         outputs=tuple(_port(port) for port in block_type.outputs.values()),
@@ -94,6 +103,38 @@ def block_reference(name: str, block_type: type[Block]) -> BlockReference:
             _parameter(name, info) for name, info in declared_fields(block_type.Params)
         ),
     )
+
+
+def example_lines(name: str, block_type: type[Block]) -> str:
+    """Write the lines of a graph file that have a block.
+
+    Args:
+        name: of the block, as graph files have it.
+        block_type: its class.
+
+    Returns:
+        YAML: the block with every input that it needs, which reads ``BLOCK.PORT``, and with the
+        parameters that have no default, as in ``example_parameters``; files have their name only.
+    """
+    word = re.sub(
+        r"(?<=[a-z0-9])(?=[A-Z])", "_", name.rpartition(".")[2].rpartition(":")[2]
+    ).lower()
+    examples = block_type.example_parameters()
+    required = [n for n, info in block_type.Params.model_fields.items() if info.is_required()]
+    given = {n: _short_name(examples[n]) for n in required if n in examples}
+    wires = [n for n, port in block_type.inputs.items() if not port.optional]
+    parts = [f"use: {name}"]
+    if given:
+        parts.append(f"with: {text_of(given)}")
+    if wires:
+        parts.append(f"in: {{{', '.join(f'{n}: BLOCK.PORT' for n in wires)}}}")
+    line = f"{word}: {{{', '.join(parts)}}}"
+    return line if len(line) <= 100 else "\n".join([f"{word}:", *(f"  {part}" for part in parts)])
+
+
+def _short_name(value: Any) -> Any:
+    """Return the name of a file in place of its path."""
+    return PurePath(value).name if isinstance(value, str) and value.startswith("/") else value
 
 
 def _port(port: Port[Any]) -> PortReference:

@@ -58,6 +58,10 @@ class BlockSpec:
     machine: str = ""
     """The machine that the block runs on; empty in a graph that names no machines."""
 
+    def carries_quaternion(self, name: str) -> bool:
+        """Return whether the field ``port.field`` carries a quaternion in this graph."""
+        return name in self.quantities and self.quantities[name].quaternion
+
 
 @dataclass(frozen=True)
 class MachineSpec:

@@ -8,15 +8,18 @@ from hashlib import blake2b
 from itertools import zip_longest
 
 from ... import __version__
+from ..language.code_digest import block_code
 from ..placement.placed import PlacedGraph
 
 
 @dataclass(frozen=True)
 class Identity:
-    """The lines of a part's graph, as its text, and of its schema, which its blocks declare."""
+    """The lines of a part's graph, as its text, of its schema, which its blocks declare, and of the code of its
+    blocks."""
 
     graph: tuple[str, ...]
     schema: tuple[str, ...]
+    code: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, placed: PlacedGraph) -> Identity:
@@ -32,8 +35,11 @@ class Identity:
                 for port, output in spec.block_type.outputs.items()
                 for name, field in output.signal.fields.items()
             ]
+        code = list(block_code(graph.blocks))
+        if graph.robot is not None:
+            code.append(f"robot {graph.robot.name}: {_hash([graph.robot.model_dump_json()])}")
         text = (f"aloft {__version__}", f"rate {graph.base_rate!r}", f"ticks {graph.ticks}")
-        return cls((*text, *graph.text.splitlines()), tuple(schema))
+        return cls((*text, *graph.text.splitlines()), tuple(schema), tuple(code))
 
     @property
     def graph_hash(self) -> str:
@@ -45,17 +51,29 @@ class Identity:
         """16 hexadecimal digits for blocks, machines, rates and the types of all outputs."""
         return _hash(self.schema)
 
+    @property
+    def code_hash(self) -> str:
+        """16 hexadecimal digits for the source of all blocks, whichever machine they run on."""
+        return _hash(self.code)
+
+    @property
+    def hashes(self) -> list[str]:
+        """The three hashes."""
+        return [self.graph_hash, self.schema_hash, self.code_hash]
+
     def difference(self, other: Identity, mine: str, others: str) -> str:
         """Describe the difference from ``other`` in one sentence; empty if there is none."""
         for what, here, there, ours, theirs in (
             ("graph", self.graph, other.graph, self.graph_hash, other.graph_hash),
             ("schema", self.schema, other.schema, self.schema_hash, other.schema_hash),
+            ("code", self.code, other.code, self.code_hash, other.code_hash),
         ):
             if ours != theirs:
                 own, foreign = _first_difference(here, there)
                 return (
                     f"the {what} is {ours} on {mine} and {theirs} on {others}; the first "
                     f"difference is {own!r} on {mine}, {foreign!r} on {others}"
+                    + ("; all machines need the same files" if what == "code" else "")
                 )
         return ""
 

@@ -125,7 +125,7 @@ class PeerStates:
         self.mailboxes: list[Callable[[], None]] = []
         self._endpoints = {spec.name: spec.endpoint for spec in placed.machines}
         self._identity = Identity.of(placed)
-        self._hashes = [self._identity.graph_hash, self._identity.schema_hash]
+        self._hashes = self._identity.hashes
         self._senders = {link.name: link.sender for link in placed.links}
         self._free = free
         self._clocks = {name: ClockOffset() for name in self.names}
@@ -259,10 +259,10 @@ class PeerStates:
         end, next_time = now + timeout, now
         while True:
             self.check()
-            self._compare()
+            fits = self._compare()
             now = time.monotonic()
             if now >= next_time:  # not on all news, or two parts would answer each other for ever
-                ready = not self._refused_since and (before is None or before())
+                ready = fits and not self._refused_since and (before is None or before())
                 if self._phase < phase and ready:
                     self._phase = phase
                 self.send_beacon()
@@ -324,9 +324,12 @@ class PeerStates:
             "heard": self._states.get(name, {}).get("phase", -1),
             "refuses": self._refused.get(name, ""),
         }
-        if self._phase is PartPhase.HELLO:
+        others = self._states.get(name, {}).get("hashes", self._hashes)
+        if self._phase is PartPhase.HELLO and others != self._hashes:
+            # only where they are needed: twenty times a second they would fill a slow network
             state["graph"] = self._identity.graph
             state["schema"] = self._identity.schema
+            state["code"] = self._identity.code
         if name in self._publishers:
             self._publishers[name](json.dumps(state).encode())
 
@@ -335,6 +338,7 @@ class PeerStates:
         with suppress(Exception):  # whatever bytes do, a thread of the network goes on
             state = json.loads(data)
             name, phase, checked = state["machine"], int(state["phase"]), list(state["checked"])
+            state["hashes"] = list(state["hashes"])
             if name not in self.names or len(bytes.fromhex(state["run"])) != len(self.run):
                 return
             now = time.monotonic_ns()
@@ -405,30 +409,38 @@ class PeerStates:
         for link in [link for link, sender in self._senders.items() if sender == name]:
             self._checked.pop(link, None)
 
-    def _compare(self) -> None:
+    def _compare(self) -> bool:
         """Refuse to go on beside a part that would run something else.
+
+        Returns:
+            Whether all that were heard fit; where one does not, it is not yet known in what.
 
         Raises:
             PeerError: both hashes, and the first difference.
         """
         if self._phase > PartPhase.HELLO:
-            return
+            return True
+        fits = True
         for name in self.names:
             heard = self._states.get(name, {})
-            if "graph" not in heard:
-                if heard and heard["hashes"] != self._hashes:
-                    raise PeerError(
-                        f"{self.machine} and {name} do not fit together: graph and schema are "
-                        f"{' and '.join(self._hashes)} on {self.machine}, "
-                        f"{' and '.join(heard['hashes'])} on {name}, which is running already"
-                    )
+            if heard.get("hashes", self._hashes) == self._hashes:
                 continue
-            other = Identity(tuple(heard["graph"]), tuple(heard["schema"]))
+            fits = False
+            if "graph" not in heard:
+                if heard["phase"] > PartPhase.HELLO:
+                    raise PeerError(
+                        f"{self.machine} and {name} do not fit together: graph, schema and code are "
+                        f"{', '.join(self._hashes)} on {self.machine}, "
+                        f"{', '.join(heard['hashes'])} on {name}, which is running already"
+                    )
+                continue  # what differs comes with its next beacon
+            other = Identity(*(tuple(heard.get(key, ())) for key in ("graph", "schema", "code")))
             difference = self._identity.difference(other, self.machine, name)
             if difference:
                 error = PeerError(f"{self.machine} and {name} do not fit together: {difference}")
                 self.send_beacon(str(error))
                 raise error
+        return fits
 
     def _missing_text(self, missing: list[str], phase: PartPhase, timeout: float) -> str:
         silent = [name for name in missing if name not in self._states]

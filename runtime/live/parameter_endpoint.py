@@ -10,9 +10,10 @@ one line of JSON, and so is its answer::
 
 Where something is wrong the answer is ``{"error": text}``, with the report of a ``LoadError`` under
 ``report``. ``control`` pauses the run and goes back: ``do`` is ``pause``, ``go on`` (for ``ticks``, if
-they are given), ``back`` (to the last snapshot up to ``tick``) or ``look``, and the answer is
-``RunControl.about``. With the answer to ``watch`` comes the descriptor of a window; see ``live.window``. A thread of its own answers; the control thread only looks into the slot of
-``LiveParameters`` once a tick.
+they are given), ``back`` (to the last snapshot up to ``tick``), ``play`` (at ``percent`` of real time)
+or ``look``, and the answer is ``RunControl.about``. With the answer to ``watch`` comes the descriptor
+of a window; see ``live.window``. A thread of its own answers; the control thread only looks into the
+slot of ``LiveParameters`` once a tick.
 """
 
 from __future__ import annotations
@@ -200,8 +201,10 @@ def _control(message: Mapping[str, Any], control: RunControl) -> dict[str, Any]:
         control.go_on(None if ticks is None else int(ticks))
     elif do == "back":
         control.go_back(int(message["tick"]))
+    elif do == "play":
+        control.play(int(message["percent"]))
     elif do != "look":
-        raise AloftError(f"a run does not {do!r}; it can pause, go on, back and look")
+        raise AloftError(f"a run does not {do!r}; it can pause, go on, back, play and look")
     return control.about()
 
 

@@ -97,9 +97,8 @@ class Tunables:
 
     def _own_unit(self, block: str, path: str) -> str:
         """Return the unit that a block's parameters share, where this is one of them."""
-        params: Any = self._blocks[block].params
         name = path.removeprefix(f"{block}.").partition(".")[0]
-        return str(params.unit) if name in getattr(params, "in_unit", ()) else ""
+        return self._blocks[block].params.own_unit(name)
 
     def _place(self, path: str) -> str:
         """Return the place where a parameter is written; of one that is not, its block's place."""

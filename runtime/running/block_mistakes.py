@@ -8,8 +8,8 @@ from ...mathematics.compiling.fingerprint import numba_functions
 from ...mathematics.compiling.kernel_registry import is_kernel
 from ...mathematics.compiling.numba_calls import uses_blas
 from ..language.errors import ExitCode, RunError
+from ..language.extensions import is_own
 from ..language.stages import CheckedGraph
-from .kernel_checks import OWN
 from .memory import BoundGraph
 
 
@@ -19,7 +19,7 @@ def mistakes_of(graph: CheckedGraph) -> dict[str, str]:
     found: dict[str, str] = {}
     for spec in graph.blocks:
         kind = spec.block_type
-        if kind.__module__.startswith(OWN) or not any(map(is_kernel, kind.named_steps.values())):
+        if is_own(kind.__module__) or not any(map(is_kernel, kind.named_steps.values())):
             continue
         alone = replace(graph, blocks=(replace(spec, wires={}),), order=(spec.path,))
         try:

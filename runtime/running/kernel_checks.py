@@ -7,10 +7,8 @@ from collections.abc import Mapping
 from ...mathematics.compiling.kernel_call import KernelCall
 from ..language.block import Block
 from ..language.errors import ExitCode, RunError
+from ..language.extensions import is_own
 from ..language.stages import BlockSpec, CheckedGraph
-
-OWN = __name__.partition(".")[0] + "."
-"""Modules whose kernels the package's own tests check."""
 
 
 class KernelMistake(RunError):
@@ -38,7 +36,7 @@ def check_kernels(graph: CheckedGraph, blocks: Mapping[str, Block]) -> None:
 def mistake_of(spec: BlockSpec, block: Block) -> str:
     """Return what is wrong with a block's kernels, with its place in the graph; empty if nothing is."""
     for call in (*getattr(block, "kernel_calls", ()), *getattr(block, "update_calls", ())):
-        if not isinstance(call, KernelCall) or call.kernel.__module__.startswith(OWN):
+        if not isinstance(call, KernelCall) or is_own(call.kernel.__module__):
             continue
         from ...mathematics.compiling.rehearsal import mistake_in
 

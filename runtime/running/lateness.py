@@ -73,11 +73,22 @@ class TickLateness:
         return cls.of(sorted(sums.items()), sum(part["late"] for part in found), limit, most)
 
     def __str__(self) -> str:
-        return (
-            f"ticks began {self.p50_us:.3g} us (median), {self.p99_us:.3g} us (99 %), "
-            f"{self.p99_9_us:.3g} us (99.9 %) and at most {self.max_us:.4g} us after their "
-            f"deadlines; {self.late} of {self.ticks} were more than {self.late_after_us:.4g} us late"
+        p50, p99, p99_9, most, limit = (
+            duration(1e3 * us)
+            for us in (self.p50_us, self.p99_us, self.p99_9_us, self.max_us, self.late_after_us)
         )
+        return (
+            f"ticks began {p50} (median), {p99} (99 %), {p99_9} (99.9 %) and at most {most} after "
+            f"their deadlines; {self.late} of {self.ticks} were more than {limit} late"
+        )
+
+
+def duration(nanoseconds: float) -> str:
+    """Format a duration with three digits and a unit that fits."""
+    for limit, scale, unit in ((1e6, 1e3, "µs"), (1e9, 1e6, "ms")):
+        if nanoseconds < 0.9995 * limit:
+            return f"{nanoseconds / scale:.3g} {unit}"
+    return f"{nanoseconds / 1e9:.3g} s"
 
 
 class LatenessCounter:

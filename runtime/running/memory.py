@@ -95,7 +95,10 @@ class Memory:
         outputs, constants, states, own = [], [], [], []
         for spec in specs:
             for name, output in spec.block_type.outputs.items():
-                outputs.append(PortLayout(f"{spec.path}.{name}", output.signal, spec.dimensions))
+                fields = output.signal.fields
+                four = tuple(f for f in fields if spec.carries_quaternion(f"{name}.{f}"))
+                port_name = f"{spec.path}.{name}"
+                outputs.append(PortLayout(port_name, output.signal, spec.dimensions, four))
             for name, port in spec.block_type.inputs.items():
                 if name not in spec.wires:
                     constants.append(

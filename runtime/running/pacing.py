@@ -78,7 +78,7 @@ class Paced:
     def __init__(self, rate: float, source: TimeSource, late_after: float) -> None:
         self.skipped_periods = self.in_a_row = self.missed_deadline = 0
         self.lateness = LatenessCounter(round(late_after * 1e9 / rate))
-        self._rate = rate
+        self._rate = self._full_rate = rate
         self._source = source
         self._start: int | None = None
         self._first_tick = self._skipped_before = 0
@@ -113,6 +113,11 @@ class Paced:
     def restart(self) -> None:
         """Count the deadlines from the next tick on."""
         self._start = None
+
+    def play(self, share: float) -> None:
+        """Let a simulation's time pass at a share of real time (1: real time) from the next tick on."""
+        self._rate = share * self._full_rate
+        self.restart()
 
     def _deadline(self, start: int, tick: int) -> int:
         # computed from the count of periods, so that rounding errors do not add up

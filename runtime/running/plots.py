@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...plotting import Curve, Panel, panels_svg, save_panels
+from ..language.quantities import Quantity
 from ..language.selection import Selection, read_selection, select
 from ..language.signals import Field
 from ..language.stages import BlockSpec, CheckedGraph
@@ -75,7 +76,7 @@ def plot_signals(
     kept &= time >= start if start is not None else True
     kept &= time <= end if end is not None else True
     if not kept.any():
-        raise ValueError(f"nothing was recorded between {start} s and {end} s")
+        raise ValueError(nothing_between(start, end))
     panels = []
     for name in names:
         source, selection = read_selection(name) or (name, Selection())
@@ -85,7 +86,7 @@ def plot_signals(
         for each in found or [base]:
             values = run.signal(each)[kept]
             shape = values.shape[1:]
-            unit, labels, rows = _declared(run.graph, each, shape)
+            unit, labels, rows, y_names = _declared(run.graph, each, shape)
             try:
                 places = select(Selection("", selection.indices), shape, rows).reshape(-1)
             except ValueError as error:
@@ -94,29 +95,31 @@ def plot_signals(
             lines = [
                 Curve(labels[k] if shape else "", time[kept], flat[:, k]) for k in places.tolist()
             ]
-            panels.append(Panel(f"{each} [{unit}]" if unit else each, lines))
+            panels.append(Panel(f"{each} [{unit}]" if unit else each, lines, y_names=y_names))
     title = run.graph.name if run.graph is not None else ""
     return SignalPlot(title, tuple(panels))
 
 
 def _declared(
     graph: CheckedGraph | None, name: str, shape: tuple[int, ...]
-) -> tuple[str, list[str], tuple[str, ...]]:
-    """Return the unit of a field, the name of each of its elements, and the names of its rows if
-    they have any. Of a result without its graph, as after pickling, only numbers are known."""
+) -> tuple[str, list[str], tuple[str, ...], dict[int, str]]:
+    """Return the unit of a field, the name of each of its elements, the names of its rows if they
+    have any, and those of its values. Of a result without its graph, as after pickling, only numbers are known."""
     numbers = [", ".join(map(str, place)) for place in np.ndindex(*shape)]
     path, _, rest = name.partition(".")
     spec = None if graph is None else next((s for s in graph.blocks if s.path == path), None)
     field = None if spec is None else _field(spec, rest)
     if graph is None or spec is None or field is None:
-        return "", numbers, ()
+        return "", numbers, (), {}
+    values = {int(value): value.name.lower() for value in field.values or ()}
     quantity = spec.quantities.get(rest)
-    unit = quantity.unit if quantity is not None else field.unit
-    text = "" if unit is None or str(unit) == "1" else str(unit)
+    quantity = quantity or Quantity(field.unit)
+    text = "" if quantity.unit_text == "1" else quantity.unit_text
     if graph.robot is not None and field.shape == ("n_joints",):
         joints = tuple(joint.name for joint in graph.robot.joints)
-        return text, list(joints), joints
-    return text, list(AXES) if field.shape == (3,) and field.frame else numbers, ()
+        return text, list(joints), joints, values
+    axes = list(AXES) if field.shape == (3,) and field.frame else numbers
+    return text, axes, (), values
 
 
 def _field(spec: BlockSpec, name: str) -> Field | None:
@@ -124,3 +127,14 @@ def _field(spec: BlockSpec, name: str) -> Field | None:
     port, _, key = name.partition(".")
     found = {**spec.block_type.inputs, **spec.block_type.outputs}.get(port)
     return None if found is None else found.signal.fields.get(key)
+
+
+def nothing_between(start: float | None, end: float | None) -> str:
+    """Return what to say of a stretch of time without ticks, of which the ends may be open."""
+    if start is None and end is None:
+        return "nothing was recorded: there is no tick"
+    if end is None:
+        return f"nothing was recorded from {start:g} s on"
+    if start is None:
+        return f"nothing was recorded until {end:g} s"
+    return f"nothing was recorded between {start:g} s and {end:g} s"

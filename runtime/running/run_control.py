@@ -26,6 +26,7 @@ from ..language.parameters import Parameters
 from ..language.registry import block_name
 from .failures import describe
 from .memory import BoundGraph, Snapshot
+from .pacing import Paced
 from .sink import Note, Sink
 from .sinks import RunHash
 from .ticker import Ticker
@@ -39,6 +40,8 @@ MOST_MEMORY = 1 << 26
 NOT_STARTED = "the run has not started yet"
 POLL = 0.01
 """Seconds between two looks for a command while a run is paused."""
+PERCENT = (1, 1000)
+"""Limits of a playback rate [% of real time]."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,7 @@ class RunControl(Sink):
         self._finished = self._closed = False
         self._reason: str | None = None
         self._no_more = ""
+        self._percent = 100
 
     def open(self, bound: BoundGraph) -> None:
         """Find out whether the run can be paused.
@@ -233,6 +237,24 @@ class RunControl(Sink):
             raise AloftError(f"a run goes on for at least 1 tick, not {ticks}")
         self._submit(lambda: self._go_on(ticks))
 
+    def play(self, percent: int) -> None:
+        """Set the playback rate of a run in paced time.
+
+        Args:
+            percent: of real time, 1 to 1000.
+
+        Raises:
+            AloftError: the run cannot be paused, runs as fast as it can, or ``percent`` is out of range.
+        """
+        least, most = PERCENT
+        if not least <= percent <= most:
+            raise AloftError(f"a playback rate is {least} to {most} % of real time, not {percent}")
+        if not self.refusal and not isinstance(self._ticker.pacer, Paced):
+            raise AloftError(
+                "this run goes as fast as it can; start it with --set clock.kind=paced for a playback rate"
+            )
+        self._submit(lambda: self._play(percent))
+
     def go_back(self, tick: int) -> int:
         """Go back to the last snapshot at or before ``tick``, and stay paused there.
 
@@ -253,7 +275,7 @@ class RunControl(Sink):
         Returns:
             ``paused``; ``tick``, which runs next; ``kept``, the ticks of all snapshots; ``room``, how
             many there can be; ``interval`` between two in ticks; ``over``, why the run is at its end;
-            ``problem``, why no more are kept.
+            ``problem``, why no more are kept; ``percent``, the playback rate.
 
         Raises:
             AloftError: the run cannot be paused, or has not started.
@@ -270,6 +292,7 @@ class RunControl(Sink):
             "interval": self._every,
             "over": clock.stop_reason or over,
             "problem": self._no_more,
+            "percent": self._percent,
         }
 
     def _submit(self, work: Callable[[], None]) -> None:
@@ -279,6 +302,12 @@ class RunControl(Sink):
 
     def _pause(self) -> None:
         self._ticker.paused = True
+
+    def _play(self, percent: int) -> None:
+        pacer = self._ticker.pacer
+        assert isinstance(pacer, Paced)
+        pacer.play(percent / 100.0)
+        self._percent = percent
 
     def _go_on(self, ticks: int | None) -> None:
         if not self._ticker.paused:

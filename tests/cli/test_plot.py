@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aloft.cli.plot import in_terminal
-from aloft.plotting import Curve, Panel
+from aloft.plotting import Curve, Panel, panels_svg
 
 Call = Callable[..., Any]
 GRAPH = """
@@ -68,7 +68,7 @@ def test_files(recording: Path, call: Call, tmp_path: Path) -> None:
     [
         (["wvae.y.value"], "no signal 'wvae.y.value'; the nearest are wave.y.value"),
         (["wave.y[5]"], "wave.y[5]: [5] is outside of 2 elements"),
-        (["wave.y", "--from", "7"], "nothing was recorded between 7.0 s and None s"),
+        (["wave.y", "--from", "7"], "nothing was recorded from 7 s on"),
         (["wave.y", "--svg", "no/such/file.svg"], "cannot write the plot"),
     ],
 )
@@ -81,3 +81,17 @@ def test_constants_and_gaps_are_drawn() -> None:
     text = in_terminal(Panel("flat", [Curve("", x, np.where(x < 0.5, 3.0, np.nan))]))
     assert text.splitlines()[1].split()[0] == "3.5"
     assert any(character > "\u2800" for character in text)
+
+
+def test_an_enumeration_has_names_on_its_axis() -> None:
+    x = np.arange(4.0)
+    panel = Panel(
+        "phase",
+        [Curve("", x, np.array([0.0, 1.0, 1.0, 3.0]))],
+        y_names={0: "squat", 1: "thrust", 2: "flight", 3: "landing"},
+    )
+    text = in_terminal(panel)
+    assert all(name in text for name in ("squat", "thrust", "landing")) and "flight" not in text
+    svg = panels_svg([panel, panel], "")
+    assert svg.count(">landing<") == 2 and ">flight<" not in svg, "those that occur"
+    assert svg.count(">time [s]<") == 1, "x is named once"

@@ -173,6 +173,29 @@ def test_parts_that_are_started_one_by_one_and_their_recordings_merged(here: Pat
     assert "copy.rrd are both of machine 'ground'" in again["reason"]
 
 
+@pytest.mark.long
+def test_parts_with_other_code_refuse_each_other_by_name(here: Path) -> None:
+    other = here / "other"
+    other.mkdir()
+    (other / "graph.yaml").write_text(GRAPH)
+    (other / "pieces.py").write_text(BLOCKS.replace("-0.3", "-0.4"))
+    ports = [f"--set=machines.{name}=tcp/127.0.0.1:{free_port()}" for name in ("onboard", "ground")]
+    command = [sys.executable, "-m", "aloft", "run", "graph.yaml", *ports, "--json", "--no-record"]
+    parts = [
+        subprocess.Popen(
+            [*command, "--machine", name], cwd=folder, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE, text=True,
+        )
+        for name, folder in (("ground", other), ("onboard", here))
+    ]  # fmt: skip
+    for part in parts:
+        found = result_of(part)
+        assert found["exit_code"] == 3 and found["ticks"] == 0
+        assert "do not fit together: the code is" in found["reason"]
+        assert "'code of robot, pieces:Robot: " in found["reason"]
+    assert not (here / "enabled.txt").exists() and not (here / "damping.txt").exists()
+
+
 # -- processes that are killed, frozen or interrupted ----------------------------------------------
 
 

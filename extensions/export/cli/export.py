@@ -29,6 +29,14 @@ Outputs = Annotated[
     typer.Option("--output", help="An output, as block.port, in place of all. Repeatable."),
 ]
 
+Delays = Annotated[
+    str,
+    typer.Option(
+        "--delays",
+        help="Where delays of wires into the part are: inside (the caller gives the newest values) or outside.",
+    ),
+]
+
 
 @export.command("fmu")
 def fmu(
@@ -38,6 +46,7 @@ def fmu(
     ],
     fmi: Annotated[str, typer.Option("--fmi", help="The version of FMI, 3.0 or 2.0.")] = "3.0",
     output: Outputs = None,
+    delays: Delays = "inside",
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:
@@ -53,7 +62,7 @@ def fmu(
         from ..fmi.exporting.write import export as write
 
         path, part = _parts(graph)
-        made = write(path, to, part, set_ or [], output or [], fmi)
+        made = write(path, to, part, set_ or [], output or [], fmi, delays)
         terminals = [("input", t) for t in made.inputs] + [("output", t) for t in made.outputs]
         if as_json:
             print_json(
@@ -64,6 +73,7 @@ def fmu(
                     "outputs": [t.plain() for t in made.outputs],
                     "problems": made.problems,
                     "python": made.python,
+                    "input_delays": [each.plain() for each in made.delays],
                 }
             )
             return
@@ -73,6 +83,8 @@ def fmu(
             for kind, t in terminals
         ]
         out.print(table("", ["", "variable", "shape", "unit"], rows))
+        for delay in made.delays:
+            say(out, f"{', '.join(delay.sources)}: {delay}")
         say(out, f"{made.file}: FMI {fmi}, co-simulation, steps of {made.period:.6g} s")
         if made.python:
             say(out, "it needs Python with aloft where it runs:")
@@ -98,6 +110,7 @@ def c(
         typer.Option("--check", help="A recording of the graph, of which every byte is compared."),
     ] = None,
     output: Outputs = None,
+    delays: Delays = "inside",
     set_: Overrides = None,
     as_json: AsJson = False,
 ) -> None:
@@ -109,10 +122,11 @@ def c(
     """
     with errors_reported(as_json):
         from ..clib.check import check as compare
+        from ..clib.input_delays import InputDelay
         from ..clib.write import write_library
 
         path, part = _parts(graph)
-        made = write_library(path, to, part, set_ or [], output or [], target)
+        made = write_library(path, to, part, set_ or [], output or [], target, delays)
         found = compare(made.description, check) if check is not None else None
         if as_json:
             result = {**made.about, "check": None if found is None else asdict(found)}
@@ -128,6 +142,8 @@ def c(
                 )
             ]  # fmt: skip
             out.print(table("", ["", "size"], rows))
+            for each in about["input_delays"]:
+                say(out, f"{', '.join(each['sources'])}: {InputDelay(**each)}")
             say(out, f"{to}: {len(about['blocks'])} blocks for {target}")
             if found is not None:
                 say(out, _verdict(found))

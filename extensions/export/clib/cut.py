@@ -18,6 +18,7 @@ from ....runtime.language.signals import Field
 from ....runtime.language.stages import BlockSpec, CheckedGraph
 from ....runtime.language.units import parse_unit
 from ....runtime.loading.checked import checked_file
+from .input_delays import InputDelay, input_delays, said_of, without_delays
 
 _USUAL = ("1", "m", "m/s", "m/s^2", "rad", "rad/s", "N", "N m", "kg", "s", "N/m", "W", "V", "A")
 """Units by the names that people know; a unit may have been multiplied up to a longer text."""
@@ -60,6 +61,7 @@ class Cut:
     outputs: tuple[Terminal, ...]
     graph: CheckedGraph
     inside: tuple[FlatBlock, ...]
+    delays: tuple[InputDelay, ...] = ()
 
     @property
     def text(self) -> str:
@@ -74,6 +76,7 @@ def cut(
     outputs: Sequence[str] = (),
     *,
     alone: bool = False,
+    delays: str = "inside",
 ) -> Cut:
     """Cut a part out of a graph.
 
@@ -87,6 +90,8 @@ def cut(
         alone: whether only blocks are taken on which an output depends, and no robot. Of a whole
             graph a robot is never taken, unless ``outputs`` has one of its own; the outputs are then by
             default what its robots read.
+        delays: whether those of wires into the part are ``inside``, so that the caller gives the newest values,
+            or ``outside``, so that it gives them late.
 
     Raises:
         LoadError: the graph may not run.
@@ -117,11 +122,16 @@ def cut(
         ends = [source.rpartition(".")[0] for source in chosen.values()]
         needed = _ancestors(ends, specs, {*robots, *external})
         inside = [b for b in inside if b.path in needed]
+    late = input_delays(inside, graph, delays)
+    if delays == "outside":
+        inside, graph = without_delays(inside, graph, late)
+        specs = {spec.path: spec for spec in graph.blocks}
     read = _read_from_outside(inside, specs)
     for block in external:
         read.setdefault(block, {})["y"] = None
     titles = _input_names(flat, part, read, external)
     stubs, inputs = _stubs(read, titles, specs, external)
+    inputs = [replace(each, text=each.text + said_of(each.source, late)) for each in inputs]
     results = []
     for name, source in chosen.items():
         block, _, port = source.rpartition(".")
@@ -136,7 +146,7 @@ def cut(
         f"  {path}: {{use: export.Outside, with: {{ports: {json.dumps(ports)}}}}}\n"
         for path, ports in stubs.items()
     ]
-    return Cut(without, "".join(lines), tuple(inputs), tuple(results), graph, blocks)
+    return Cut(without, "".join(lines), tuple(inputs), tuple(results), graph, blocks, late)
 
 
 Read = dict[str, dict[str, "dict[str, None] | None"]]
@@ -223,10 +233,16 @@ def _terminals(
             _unit_text(_quantity(spec, port, field_name)),
             field.text or spec.block_type.outputs[port].text,
             frame=_quantity(spec, port, field_name).frame,
+            start=_start(_quantity(spec, port, field_name), field.resolve(spec.dimensions)),
         )
         for field_name, field in fields.items()
         if wanted is None or field_name in wanted
     ]
+
+
+def _start(quantity: Quantity, shape: tuple[int, ...]) -> Any:
+    """Return what is there before the first value: zero, and of quaternions no turn."""
+    return np.broadcast_to((0.0, 0.0, 0.0, 1.0), shape).tolist() if quantity.quaternion else 0
 
 
 def _has_elements(terminal: Terminal) -> bool:
@@ -237,7 +253,9 @@ def _has_elements(terminal: Terminal) -> bool:
 def _quantity(spec: BlockSpec, port: str, name: str) -> Quantity:
     """Return the unit and frame of a field as the graph has settled them."""
     field: Field = spec.block_type.outputs[port].signal.fields[name]
-    return spec.quantities.get(f"{port}.{name}") or Quantity(field.unit, field.frame)
+    return spec.quantities.get(f"{port}.{name}") or Quantity(
+        field.unit, field.frame, quaternion=field.quaternion
+    )
 
 
 def _unit_text(quantity: Quantity) -> str | None:

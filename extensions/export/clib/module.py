@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....mathematics.compiling.arguments import ArgumentType, ArrayType, RecordType, type_of
+from ....mathematics.compiling.failures import Failure
 from ....mathematics.compiling.kernel_call import KernelCall
 from ....mathematics.compiling.llvm_code import leaves, number
 from ....mathematics.compiling.machine_code import read_only_arguments
@@ -38,6 +39,10 @@ class Status(IntEnum):
     BAD_INSTANCE = -3
     BAD_ARGUMENT = -4
     BAD_INPUT = -5
+    TOO_LARGE = -6
+    OUT_OF_DOMAIN = -7
+    OUT_OF_RANGE = -8
+    WRONG_LENGTH = -9
 
 
 STATUS_TEXTS = {
@@ -49,7 +54,16 @@ STATUS_TEXTS = {
     Status.BAD_INSTANCE: "the pointer is null, not aligned to 8 bytes, or no instance of this library",
     Status.BAD_ARGUMENT: "a size, a parameter or a value is not one that this function takes",
     Status.BAD_INPUT: "an input is NaN or infinite; the step has done nothing",
+    Status.TOO_LARGE: "a block got a whole number that does not fit into 64 bits, see last_block",
+    Status.OUT_OF_DOMAIN: "a block called a function outside of its domain, see last_block",
+    Status.OUT_OF_RANGE: "a block got a number beyond the largest float, see last_block",
+    Status.WRONG_LENGTH: "a block met a slice of another length than what it is combined with, see last_block",
 }
+_STATUS_OF = {
+    Failure.DIVISION: Status.DIVIDED_BY_ZERO, Failure.TOO_LARGE: Status.TOO_LARGE, Failure.DOMAIN: Status.OUT_OF_DOMAIN,
+    Failure.RANGE: Status.OUT_OF_RANGE, Failure.SLICE: Status.WRONG_LENGTH,
+}  # fmt: skip
+"""What a library says of a kernel that fails; one with functions of Numba is not exported."""
 MARK, CODE, BLOCK = 0, 8, 12
 """The bytes of an instance that hold the mark of the library, the last code and its block."""
 
@@ -287,14 +301,21 @@ class Module:
         self._end(code)
 
     def _end(self, code: _Code) -> None:
-        """Write the labels at which calls that divide by zero go on."""
+        """Write the label at which calls that fail go on."""
         if code.failures:
-            code.label("divided")
-            pairs = ", ".join(f"[ {block}, %{label} ]" for block, label in code.failures)
-            code(f"%who = phi i32 {pairs}")
-            code(f"store i32 {int(Status.DIVIDED_BY_ZERO)}, ptr {code.at(CODE)}")
+            code.label("failed")
+            blocks = ", ".join(f"[ {block}, %{label} ]" for block, _, label in code.failures)
+            statuses = ", ".join(f"[ {status}, %{label} ]" for _, status, label in code.failures)
+            code(f"%who = phi i32 {blocks}")
+            code(f"%what = phi i32 {statuses}")
+            code("%kind = and i32 %what, 15")
+            told = str(int(Status.DIVIDED_BY_ZERO))
+            for failure, status in _STATUS_OF.items():
+                is_it = code.value(f"icmp eq i32 %kind, {int(failure)}")
+                told = code.value(f"select i1 {is_it}, i32 {int(status)}, i32 {told}")
+            code(f"store i32 {told}, ptr {code.at(CODE)}")
             code(f"store i32 %who, ptr {code.at(BLOCK)}")
-            code(f"ret i32 {int(Status.DIVIDED_BY_ZERO)}")
+            code(f"ret i32 {told}")
 
     def _make(self, code: _Code, calls: Sequence[ScheduledCall], *, events: bool) -> None:
         """Make calls, those of slower blocks in their ticks only."""
@@ -324,9 +345,9 @@ class Module:
         status = code.value(f'call i32 @"{made.name}"({", ".join(operands)})')
         if made.fails:
             failed = code.value(f"icmp ne i32 {status}, 0")
-            code.failures.append((block, code.current))
+            code.failures.append((block, status, code.current))
             following = code.name("went")
-            code(f"br i1 {failed}, label %divided, label %{following}, !prof !0")
+            code(f"br i1 {failed}, label %failed, label %{following}, !prof !0")
             code.label(following)
         if after:
             code.jump(after)
@@ -499,7 +520,7 @@ class _Code:
         self._count = 0
         self._places: dict[tuple[int, str], str] = {}
         self.current = "entry"
-        self.failures: list[tuple[int, str]] = []
+        self.failures: list[tuple[int, str, str]] = []
 
     def __call__(self, line: str) -> None:
         self._lines.append(f"  {line}")

@@ -63,7 +63,11 @@ class SubGraph:
 
 
 def take_part(
-    path: str, part: str = "", overrides: Sequence[str] = (), outputs: Sequence[str] = ()
+    path: str,
+    part: str = "",
+    overrides: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    delays: str = "inside",
 ) -> SubGraph:
     """Return the part of a graph that a library shall compute.
 
@@ -72,13 +76,14 @@ def take_part(
         part: the path of a sub-graph or of a block; empty for the whole graph without its robot.
         overrides: parameters to change.
         outputs: what the outputs are, ``block.port``; by default as ``cut`` says.
+        delays: the side of those of wires into it, ``inside`` or ``outside``.
 
     Raises:
         LoadError: the graph may not run.
         NeedsPython: blocks in it need Python.
         AloftError: there is no such part.
     """
-    found = cut(path, part, overrides, outputs, alone=True)
+    found = cut(path, part, overrides, outputs, alone=True, delays=delays)
     own = {block.path for block in found.inside}
     specs = {
         spec.path: spec
@@ -157,15 +162,41 @@ def _is_empty(kind: type[Block], step: str) -> bool:
     return code is not None and code.co_code == _nothing.__code__.co_code
 
 
+def read_by_prepare(block: Block) -> frozenset[str]:
+    """Return the parameters from which Python computes constants: those that ``prepare`` reads."""
+    if type(block).prepare is Block.prepare:
+        return frozenset()
+    given = block.params
+    names = frozenset(type(given).model_fields)
+    read: set[str] = set()
+
+    class Watched(type(given)):  # type: ignore[misc]  # its base is known at run time alone
+        def __getattribute__(self, name: str) -> Any:
+            if name in names:
+                read.add(name)
+            elif name in ("__dict__", "model_dump", "__iter__", "model_copy"):
+                read.update(names)  # whatever it takes of them
+            return super().__getattribute__(name)
+
+    watched = given.model_copy()
+    object.__setattr__(watched, "__class__", Watched)
+    block.params = watched
+    try:
+        block.prepare()
+    finally:
+        block.params = given
+    return frozenset(read)
+
+
 def _parameters(block: Block) -> Iterator[NumberParameter | str]:
     """Yield the live parameters of a block, number by number; as a text those that stay as they are."""
-    prepared = type(block).prepare is not Block.prepare
+    prepared = read_by_prepare(block)
     for name, info in type(block.params).model_fields.items():
         if not is_live(info):
             continue
         full = f"{block.context.path}.{name}"
         array = block.parameter_arrays.get(name)
-        if prepared or array is None or array.dtype.kind not in "fib":
+        if name in prepared or array is None or array.dtype.kind not in "fib":
             yield full
             continue
         bounds = {
@@ -178,7 +209,7 @@ def _parameters(block: Block) -> Iterator[NumberParameter | str]:
         for element in range(array.size):
             yield NumberParameter(
                 f"{full}[{element}]" if array.ndim else full, block.context.path, name, element,
-                str(extra.get("unit", "")), info.description or "",
+                str(extra.get("unit", "")) or block.params.own_unit(name), info.description or "",
                 *(bounds.get(key) for key in ("ge", "gt", "le", "lt")),
             )  # fmt: skip
 

@@ -13,6 +13,7 @@ from .... import __version__
 from ....runtime.language.errors import AloftError
 from ....runtime.language.layout import Layout
 from .cut import Terminal
+from .input_delays import rates
 from .module import STATUS_TEXTS, Module, Status
 from .part import SubGraph, take_part, terminal_groups
 from .targets import TARGETS, compile_module, link
@@ -56,6 +57,7 @@ def write_library(
     overrides: Sequence[str] = (),
     outputs: Sequence[str] = (),
     target: str = "x86_64",
+    delays: str = "inside",
 ) -> Written:
     """Write a graph, or a part of it, as a library of C.
 
@@ -66,12 +68,13 @@ def write_library(
         overrides: parameters to change.
         outputs: what the outputs are, ``block.port``.
         target: the kind of processor, of ``TARGETS``.
+        delays: the side of those of wires into the part, ``inside`` or ``outside``.
 
     Raises:
         LoadError: the graph may not run.
         AloftError: the part needs Python, the name is none in C, or a tool fails.
     """
-    made = prepare(path, to.name, part, overrides, outputs, target)
+    made = prepare(path, to.name, part, overrides, outputs, target, delays)
     name, taken, about = made.name, made.part, made.about
     to.mkdir(parents=True, exist_ok=True)
     (to / f"{name}.o").write_bytes(compile_module(made.module.text(), TARGETS[target]))
@@ -101,6 +104,7 @@ def prepare(
     overrides: Sequence[str] = (),
     outputs: Sequence[str] = (),
     target: str = "x86_64",
+    delays: str = "inside",
 ) -> Prepared:
     """Return a part of a graph as code, with its description; the parameters are those of ``write_library``.
 
@@ -114,13 +118,20 @@ def prepare(
         )
     if target not in TARGETS:
         raise AloftError(f"there is no target {target!r}; there is {', '.join(TARGETS)}")
-    taken = take_part(path, part, overrides, outputs)
-    digest = sha256(taken.graph.text.encode() + f"{part} {outputs}".encode()).hexdigest()
+    taken = take_part(path, part, overrides, outputs, delays)
+    digest = sha256(
+        taken.graph.text.encode() + f"{part} {outputs}{_moved(taken)}".encode()
+    ).hexdigest()
     texts = {"version": f"aloft {__version__}", "graph_hash": digest}
     module = Module(name, taken, int(digest[:15], 16), texts)
     about = _describe(name, target, taken, module, texts)
     about["graph"], about["part"] = Path(path).name, part
     return Prepared(name, taken, module, about)
+
+
+def _moved(part: SubGraph) -> str:
+    """Return the delays that are outside, as the hash of a graph has them."""
+    return "".join(str(each) for each in part.cut.delays if each.side == "outside")
 
 
 def _describe(
@@ -143,6 +154,8 @@ def _describe(
         "parameters": [each._asdict() for each in part.parameters],
         "fixed_parameters": list(part.fixed),
         "blocks": list(part.blocks),
+        "rates": rates({spec.path: spec for spec in part.graph.blocks}, part.blocks),
+        "input_delays": [each.plain() for each in part.cut.delays],
         "signals": _slots(memory.bus.layout, module.bus_place, part),
         "states": _slots(memory.state.layout, module.state_place, part),
         "statuses": {each.name: [int(each), STATUS_TEXTS[each]] for each in Status},
@@ -197,6 +210,17 @@ def _struct(name: str, kind: str, terminals: Sequence[Terminal]) -> str:
     return "\n".join((*lines, f"}} {name}_{kind};"))
 
 
+def _slower(about: dict[str, Any], period: float) -> str:
+    """Return a sentence on the blocks that do not run in every tick; nothing where there are none."""
+    groups = [each for each in about["rates"] if each["every"] > 1]
+    lines = [
+        f" *   every {each['every']} ticks ({1.0 / (each['every'] * period):.9g} Hz), from tick {each['from']}: "
+        + ", ".join(each["blocks"])
+        for each in groups
+    ]
+    return "\n".join((" Blocks that do not run in every tick:", *lines, " *")) if lines else ""
+
+
 def _header(name: str, part: SubGraph, about: dict[str, Any]) -> str:
     upper = name.upper()
     codes = "\n".join(
@@ -209,7 +233,7 @@ def _header(name: str, part: SubGraph, about: dict[str, Any]) -> str:
     return f"""\
 /* {name}: {about["graph"]}{f", {about['part']}" if about["part"] else ""}, written by {about["version"]}.
  *
- * A tick takes {part.graph.base_period:.9g} s of the controller's time. The library allocates nothing, keeps
+ * A tick takes {part.graph.base_period:.9g} s of the controller's time.{_slower(about, part.graph.base_period)} The library allocates nothing, keeps
  * nothing outside of an instance, and uses no file, thread or lock: instances are independent.
  * Build with strict floating point, as compilers do unless they are told -ffast-math. */
 #ifndef {upper}_H

@@ -58,8 +58,8 @@ export class World {
     const words = new BigInt64Array(buffer, this.self, size / 8);
     for (const [place, word] of robot.words) words[place] = BigInt(word);
 
-    this.model = mujoco.MjModel.from_xml_string(about.xml);
-    for (const [field, values] of Object.entries(robot.model)) this.model[field].set(values);
+    this.models = [];
+    this.model = this.modelWith(robot);
     this.data = new mujoco.MjData(this.model);
     const integration = mujoco.mjtState.mjSTATE_INTEGRATION.value;
     mujoco.mj_setState(this.model, this.data, robot.state, integration);
@@ -75,21 +75,24 @@ export class World {
     );
     const to = views(about.to), from = views(about.from);
     const out = () => { for (const [field, own] of from) own.set(this.data[field]); };
-    const library = {
-      step1: () => { mujoco.mj_step1(this.model, this.data); out(); },
-      step2: () => {
+    const simulate = ({ call, flags, arguments: more, when }) => {
+      const model = this.modelWith(robot, flags);
+      const wanted = when === null ? [1n] : new BigInt64Array(buffer, this.self + when, 1);
+      const made = mujoco[call];
+      return () => {
+        if (!wanted[0]) return;
         for (const [field, own] of to) this.data[field].set(own);
-        mujoco.mj_step2(this.model, this.data);
+        made(model, this.data, ...more);
         out();
-      },
+      };
     };
     const call = (each) => {
+      if (each.call) return simulate(each);
       if (typeof each !== "string") {
         const [kind, place, count] = each;
         const drawn = new Float64Array(buffer, this.self + place, count);
         return () => { for (let k = 0; k < count; k += 1) drawn[k] = this.draws[kind](); };
       }
-      if (library[each]) return library[each];
       const made = code[`${name}_${each}`];
       return () => { if (made(this.self) !== 0) throw new Error(`${each} divides by zero`); };
     };
@@ -97,6 +100,17 @@ export class World {
       Object.entries(about.programs).map(([key, program]) => [key, program.map(call)]),
     );
     out();
+  }
+
+  /** The robot's model, without what `flags` leave out. */
+  modelWith(robot, flags = null) {
+    const known = this.models.find((each) => flags === each.opt.disableflags);
+    if (known) return known;
+    const model = this.mujoco.MjModel.from_xml_string(this.about.xml);
+    for (const [field, values] of Object.entries(robot.model)) model[field].set(values);
+    if (flags !== null) model.opt.disableflags = flags;
+    this.models.push(model);
+    return model;
   }
 
   run(program) { for (const call of this.programs[program]) call(); }
@@ -128,5 +142,5 @@ export class World {
     return text;
   }
 
-  free() { this.data.delete(); this.model.delete(); }
+  free() { this.data.delete(); for (const model of this.models) model.delete(); }
 }

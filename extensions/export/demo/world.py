@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from mujoco import MjModel
 from numpy.typing import NDArray
 
 from aloft.extensions.export.clib.cut import Cut
@@ -56,7 +57,9 @@ the graph."""
 
 class World(NamedTuple):
     """A graph whose robot, drawn by a seed, stands, and its module; ``programs`` are the calls of the robot
-    in a tick: functions of the module, steps of the simulator, and draws ``[kind, place, count]``."""
+    in a tick: functions of the module, functions of the simulator ``{call, flags, arguments, when}``, and draws
+    ``[kind, place, count]``. ``flags`` say what the model of the call leaves out, and ``when`` is the place of a
+    word that leaves the call out where it is zero."""
 
     bound: BoundGraph
     module: Module
@@ -80,7 +83,7 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
 
     Raises:
         LoadError: the graph may not run.
-        NeedsPython: blocks beside the robot need Python.
+        NeedsPython: blocks beside the robot need Python, or the robot calls Python in a step.
         StartError: the robot does not stand.
     """
     graph = checked_file(graph_file, overrides)
@@ -113,24 +116,30 @@ def make_world(graph_file: Path, overrides: Sequence[str], name: str) -> World:
             programs[key].append(function)
     data = plant.data
     visible = [getattr(data, field) for field in (*TO_MUJOCO, *FROM_MUJOCO)]
-    draws = {
-        id(call): _drawn(call)
-        for program in programs.values()
-        for call in program
-        if isinstance(call, ForeignCall) and call not in (plant.step1, plant.step2)
-    }
+    foreign = [c for program in programs.values() for c in program if isinstance(c, ForeignCall)]
+    steps = {id(call) for call in foreign if _of_simulator(call)}
+    drawing = [call for call in foreign if id(call) not in steps]
+    if not all(call.words[3] for call in drawing):  # the address of what is drawn
+        raise NeedsPython([f"{graph.file}: block 'robot' calls Python in a step of its simulator"])
+    draws = {id(call): _drawn(call) for call in drawing}
+    whens = [call.when for call in foreign if call.when is not None]
     memory = bound.memory
     whole = {"bus": memory.bus.buffer, "state": memory.state.buffer}
     arrays = {key: whole[key] if key in whole else _array(bound, at) for key, at in ARRAYS.items()}
     assert graph.resolved is not None
     part = SubGraph(Cut(graph.resolved, "", (), (), graph, ()), graph, bound, blocks, (), ())
-    module = Module(name, part, 1, {}, functions, [*visible, *arrays.values(), *draws.values()])
+    module = Module(
+        name, part, 1, {}, functions, [*visible, *arrays.values(), *draws.values(), *whens]
+    )
 
     def told(each: str | ForeignCall) -> Any:
         if isinstance(each, str):
             return each
-        if id(each) not in draws:
-            return "step1" if each is plant.step1 else "step2"
+        if id(each) in steps:
+            when = None if each.when is None else module.image.place(each.when)[1]
+            model, _, *more = each.run.args
+            flags = model.opt.disableflags
+            return {"call": each.run.func.__name__, "flags": flags, "arguments": more, "when": when}
         kind = "normal" if isinstance(each.run, partial) else "uniform"  # of `random_streams`
         array = draws[id(each)]
         return [kind, module.image.place(array)[1], array.size]
@@ -148,6 +157,15 @@ def _array(bound: BoundGraph, place: str) -> NDArray[Any]:
     for name in names:
         found = getattr(found, name)
     return np.asarray(found)
+
+
+def _of_simulator(call: ForeignCall) -> bool:
+    """Say whether a call is one of MuJoCo's functions of a model and its data."""
+    return (
+        isinstance(call.run, partial)
+        and len(call.run.args) > 1
+        and isinstance(call.run.args[0], MjModel)
+    )
 
 
 def _drawn(call: ForeignCall) -> NDArray[np.float64]:

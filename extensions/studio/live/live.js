@@ -1,5 +1,4 @@
-"use strict";
-// The part of the page that belongs to a running graph; the page's own script has run before it.
+// The part of the page that belongs to a running graph; the page's own script and that of the charts have run before it.
 const PERIOD = 250, SLOWER = 1000;
 const badge = document.getElementById("state"), line = document.getElementById("line");
 const svgName = "http://www.w3.org/2000/svg";
@@ -100,11 +99,13 @@ function draw(found) {
   if (found.changes !== changes) { changes = found.changes; refresh(); }
 }
 async function look() {
-  let wait = PERIOD;
+  let wait = charts.size ? CHART_PERIOD : PERIOD;
   try {
-    const found = await call("now");
+    const asked = [...charts.keys()].map(name => "chart=" + encodeURIComponent(name)).join("&");
+    const found = await call("now?" + asked);
     if (found.state === "other") { location.reload(); return; }
     if (found.values) draw(found);
+    if (found.charted) addSamples(found.tick * data.live.period, found.charted);
     if (found.control !== undefined) drawControl(found.control);
     if (pause) pause.disabled = found.state === "ended" || found.state === "gone";
     sayParts();
@@ -150,12 +151,15 @@ if (pause) {
     const number = standing.over || !text ? null : Math.max(1, Math.round(seconds[1] / data.live.period));
     control({do: "go on", number});
   };
+  const rate = document.getElementById("rate");
+  if (rate) rate.onchange = () => control({do: "play", number: +rate.value});
   back.oninput = () => target(standing.kept[back.value]);
   back.onchange = () => control({do: "back", number: standing.kept[back.value]});
 }
 
 // Parameters that can be changed.
-let tunables = [], all = false;
+const FEW_PARAMETERS = 12;
+let tunables = [];
 const boxes = new Map();
 async function refresh() {
   if (!data.live.tuning) return;
@@ -173,7 +177,7 @@ function tunable(row) {
   const box = make("div", "", "tunable whole"), error = make("div", "", "error");
   box.dataset.path = row.path;
   const heading = document.createElement("div");
-  heading.append(make("b", all ? row.path : row.name));
+  heading.append(make("b", row.name));
   const about = [row.unit, row.bounds].filter(Boolean).join(", ");
   if (about) heading.append(" [" + about + "]");
   box.append(heading, make("div", row.text, "soft"));
@@ -192,6 +196,7 @@ function tunable(row) {
   for (const k of parts) {
     const value = k === null ? row.value : row.value[k];
     const cell = make("div", "", "number");
+    if (row.elements && row.elements.length > 1) cell.append(make("span", row.elements[k], "element"));
     if (row.kind === "choice") {
       const select = document.createElement("select");
       for (const choice of row.choices) select.append(new Option(choice, choice));
@@ -208,7 +213,7 @@ function tunable(row) {
         slider.step = row.integer ? 1 : "any";
         slider.value = value;
         slider.oninput = () => { field.value = row.integer ? slider.value : String(+(+slider.value).toPrecision(4)); send(); };
-        sliders.push(slider); cell.prepend(slider);
+        sliders.push(slider); field.before(slider);
       }
     }
     box.append(cell);
@@ -232,13 +237,13 @@ function tunable(row) {
   return box;
 }
 shown.push(path => {
-  all = false; boxes.clear();
+  boxes.clear();
   const mine = tunables.filter(row => row.block === path);
   if (!mine.length) return;
   panel.append(make("h2", "Tune"), ...mine.map(tunable));
 });
 function tuneAll() {
-  all = true; chosen = ""; boxes.clear();
+  chosen = ""; boxes.clear();
   panel.replaceChildren(make("h1", "Parameters"));
   const seek = input("search", "");
   seek.placeholder = "part of a name";
@@ -248,10 +253,21 @@ function tuneAll() {
     try { const done = await call("save", {}); said.textContent = done.count + " values are in " + done.file; }
     catch (refused) { said.textContent = refused.message; }
   };
-  const found = tunables.map(tunable);
-  seek.oninput = () => found.forEach(box => { box.hidden = !box.dataset.path.includes(seek.value); });
-  panel.append(seek, save, said, ...found);
-  if (!found.length) panel.append(make("p", "This graph has no parameter that can be changed while it runs."));
+  // folded by block; what a search finds is open
+  const folds = [...new Set(tunables.map(row => row.block))].map(block => {
+    const fold = make("details", "", "fold"), mine = tunables.filter(row => row.block === block);
+    fold.append(make("summary", block + " (" + mine.length + ")"), ...mine.map(tunable));
+    fold.open = tunables.length <= FEW_PARAMETERS;
+    return fold;
+  });
+  seek.oninput = () => folds.forEach(fold => {
+    const boxes = [...fold.querySelectorAll(".tunable")];
+    boxes.forEach(box => { box.hidden = !box.dataset.path.includes(seek.value); });
+    fold.hidden = boxes.every(box => box.hidden);
+    fold.open = seek.value ? !fold.hidden : tunables.length <= FEW_PARAMETERS;
+  });
+  panel.append(seek, save, said, ...folds);
+  if (!folds.length) panel.append(make("p", "This graph has no parameter that can be changed while it runs."));
 }
 
 // A pad for each block that takes a velocity from the page. It springs back, and beats as long as it is held.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -98,8 +98,17 @@ class LiveRun:
             if self._other() is not None:
                 self._attach()
 
-    def now(self) -> dict[str, Any]:
-        """Return the present state, as plain data."""
+    def lines(self, name: str) -> dict[str, Any]:
+        """Describe the lines of a field in a strip chart; see ``ValueTexts.lines``."""
+        with self._lock:
+            return self._texts.lines(name)
+
+    def now(self, charted: Sequence[str] = ()) -> dict[str, Any]:
+        """Return the present state, as plain data.
+
+        Args:
+            charted: fields whose numbers are wanted, too, by ``block.port.field``.
+        """
         with self._lock:
             assert self._reader is not None
             look = self._reader.look()
@@ -123,9 +132,9 @@ class LiveRun:
                     state, said = "gone", "the process has gone, and did not say why"
                 else:
                     said = paused_text(control, self.graph.base_period)
-            return {"state": state, "said": said, "control": control, **self._moment(look)}
+            return {"state": state, "said": said, "control": control, **self._moment(look, charted)}
 
-    def _moment(self, look: WindowContents) -> dict[str, Any]:
+    def _moment(self, look: WindowContents, charted: Sequence[str]) -> dict[str, Any]:
         assert self._reader is not None
         period = self.graph.base_period
         lines = [f"the part on {self.machine}"] if self.machine else []
@@ -137,6 +146,7 @@ class LiveRun:
             lines.append(lateness_text(look))
         return {
             "tick": look.tick,
+            "charted": self._texts.numbers(look.bus, charted),
             "line": "; ".join(line for line in lines if line),
             "values": self._texts.all(look.bus),
             "brief": self._texts.brief(look.bus),
@@ -197,13 +207,19 @@ class LiveRun:
         """True if the run can be paused and go back."""
         return not self._about["refusal"]
 
+    @property
+    def is_paced(self) -> bool:
+        """True if ticks begin by wall time, at a playback rate that can be chosen."""
+        return self.clock == "paced"
+
     def control(self, do: str, number: int | None = None) -> dict[str, Any]:
         """Pause the run, go back in it, or let it go on.
 
         Args:
             do: ``pause``; ``go on``, with the number of ticks after which it pauses again; ``back``,
-                with the tick, to the last snapshot up to it; or ``look``.
-            number: of ticks, or the tick.
+                with the tick, to the last snapshot up to it; ``play``, with the percentage of real
+                time; or ``look``.
+            number: of ticks, the tick, or the percentage.
 
         Returns:
             How the run stands then; see ``RunControl.about``.
@@ -211,7 +227,7 @@ class LiveRun:
         Raises:
             EndpointError: nobody answers, or the run refuses.
         """
-        of = {"back": "tick", "go on": "ticks"}.get(do)
+        of = {"back": "tick", "go on": "ticks", "play": "percent"}.get(do)
         more = {of: number} if of is not None and number is not None else {}
         return ask(self._path, {"verb": "control", "do": do, **more})
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import secrets
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from http.server import ThreadingHTTPServer
 from pathlib import Path
 from typing import Any, Literal, Protocol
@@ -19,6 +19,7 @@ from ....runtime.language.errors import AloftError
 from ....runtime.language.stages import CheckedGraph
 from ....runtime.live.tunables import Tunables, write_overlay
 from ..diagram.page import ADDRESS, LoopbackHandler, PageAddition, page, policy
+from .texts import list_names
 
 Opened = Literal["diagram", "parameters"]
 """Panel that the side of the page shows at first."""
@@ -31,8 +32,14 @@ _PAUSES = (
     '<span id="control"><button id="pause">pause</button><span id="paused" hidden>'
     '<input type="range" id="back" list="kept" aria-label="go back to"><datalist id="kept"></datalist>'
     '<output id="target"></output><label>for <input id="for" placeholder="no end" '
-    'aria-label="go on for"></label></span><output id="refused"></output></span>'
+    'aria-label="go on for"></label></span>{rate}<output id="refused"></output></span>'
 )
+_RATE = (
+    '<select id="rate" aria-label="playback rate">'
+    '<option value="100">real time</option><option value="50">half speed</option>'
+    '<option value="20">a fifth</option><option value="5">a twentieth</option></select>'
+)
+"""Playback rates [% of real time] of a run in paced time."""
 
 
 def live_page(
@@ -42,6 +49,7 @@ def live_page(
     *,
     tuning: bool = True,
     pauses: bool = False,
+    paced: bool = False,
     save: str = "",
     opened: Opened = "diagram",
 ) -> str:
@@ -53,6 +61,7 @@ def live_page(
         token: without which the server answers nothing.
         tuning: whether parameters can be changed.
         pauses: whether the run can be paused and go back.
+        paced: whether it runs in paced time, at a playback rate that can be chosen.
         save: the name of the file for changed values, as it is shown.
         opened: what its side shows at first.
     """
@@ -64,7 +73,7 @@ def live_page(
     addition = PageAddition(
         "live",
         data,
-        f'{_CONTROLS}{button}{_PAUSES if pauses else ""}<output id="parts"></output><output id="line"></output>',
+        f'{_CONTROLS}{button}{_PAUSES.format(rate=_RATE if paced else "") if pauses else ""}<output id="parts"></output><output id="line"></output>',
         (_HERE / "live.css").read_text(encoding="utf-8"),
         _script(),
     )
@@ -77,9 +86,11 @@ def live_policy() -> str:
 
 
 def _script() -> str:
-    return (_HERE / "live.js").read_text(encoding="utf-8")
+    return "".join((_HERE / name).read_text(encoding="utf-8") for name in ("charts.js", "live.js"))
 
 
+MOST_CHARTS = 8
+"""Strip charts on a page."""
 LONGEST_BODY = 1 << 16
 """Bytes of one request."""
 REQUEST_TIMEOUT = 10.0
@@ -95,8 +106,11 @@ class WatchedRun(Protocol):
     def has_parameters(self) -> bool:
         """True if parameters can be changed."""
 
-    def now(self) -> dict[str, Any]:
-        """Return the present state."""
+    def now(self, charted: Sequence[str] = ()) -> dict[str, Any]:
+        """Return the present state, and the numbers of the fields that are ``charted``."""
+
+    def lines(self, name: str) -> dict[str, Any]:
+        """Describe the lines of a field in a strip chart."""
 
     def refresh(self) -> None:
         """Look at the graph that runs now."""
@@ -113,6 +127,10 @@ class WatchedRun(Protocol):
     @property
     def can_be_paused(self) -> bool:
         """True if the run can be paused and go back."""
+
+    @property
+    def is_paced(self) -> bool:
+        """True if ticks begin by wall time, at a playback rate that can be chosen."""
 
     def control(self, do: str, number: int | None = None) -> dict[str, Any]:
         """Pause it, go back in it, or let it go on."""
@@ -154,7 +172,11 @@ class LiveServer(ThreadingHTTPServer):
         graph = self.run.graph
         if self._tunables is None or self._tunables[0] is not graph:
             self._tunables = graph, Tunables(graph)
-        return self._tunables[1].rows(self.run.parameters())
+        rows = self._tunables[1].rows(self.run.parameters())
+        for row in rows:
+            if row["kind"] == "numbers":
+                row["elements"] = list_names(graph, row["block"], len(row["value"]))
+        return rows
 
 
 class _RequestHandler(LoopbackHandler):
@@ -174,12 +196,19 @@ class _RequestHandler(LoopbackHandler):
             run.refresh()
             text = live_page(
                 run.graph, asked.get("closed", []), self.server.token,
-                tuning=run.has_parameters, pauses=run.can_be_paused, save=str(self.server.save), opened=self.server.opened,
+                tuning=run.has_parameters, pauses=run.can_be_paused,
+                paced=run.is_paced, save=str(self.server.save), opened=self.server.opened,
             )  # fmt: skip
             self.answer(text, "text/html")
         elif self._knows(self.headers.get("X-Aloft-Token", "")):
             if address.path == "/now":
-                self._tell(self.server.run.now)
+                charted = asked.get("chart", [])
+                if len(charted) > MOST_CHARTS:
+                    self._refuse(400, f"at most {MOST_CHARTS} fields are charted at once")
+                    return
+                self._tell(lambda: self.server.run.now(charted))
+            elif address.path == "/lines":
+                self._tell(lambda: self.server.run.lines(asked.get("field", [""])[0]))
             elif address.path == "/parameters":
                 self._tell(lambda: {"parameters": self.server.parameters()})
             else:

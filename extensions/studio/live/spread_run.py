@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -96,15 +96,27 @@ class SpreadRun:
         with self._lock:
             self._follow()
 
-    def now(self) -> dict[str, Any]:
-        """Return the present state, as plain data."""
+    def lines(self, name: str) -> dict[str, Any]:
+        """Describe the lines of a field in a strip chart; see ``ValueTexts.lines``."""
         with self._lock:
-            found = {name: part.now() for name, part in self._parts.items()}
+            machine = self.graph.block(name.rsplit(".", 2)[0]).machine
+            return self._parts[machine].texts.lines(name)
+
+    def now(self, charted: Sequence[str] = ()) -> dict[str, Any]:
+        """Return the present state, as plain data.
+
+        Args:
+            charted: fields whose numbers are wanted, too, by ``block.port.field``.
+        """
+        with self._lock:
+            found = {name: part.now(charted) for name, part in self._parts.items()}
             if all(part["state"] in ("ended", "gone", "unheard") for part in found.values()):
                 if time.monotonic() - self._tried > AGAIN and self._follow() == "other":
                     return {"state": "other", "said": "another graph runs there now"}
-                found = {name: part.now() for name, part in self._parts.items()}
-        merged: dict[str, Any] = {"values": {}, "brief": {}, "times": {}, "late": {}}
+                found = {name: part.now(charted) for name, part in self._parts.items()}
+        merged: dict[str, Any] = {
+            "values": {}, "brief": {}, "times": {}, "late": {}, "charted": {},
+        }  # fmt: skip
         for about in found.values():
             for key, into in merged.items():
                 into.update(about.get(key, {}))
@@ -138,7 +150,7 @@ class SpreadRun:
         listed = ask(self._socket(), {"verb": "list"})["parameters"]
         return [entry for entry in listed if entry["live"]]
 
-    can_be_paused = False
+    can_be_paused = is_paced = False
 
     def control(self, do: str, number: int | None = None) -> dict[str, Any]:
         """Refused. Raises ``AloftError``."""
@@ -164,7 +176,7 @@ class _Part:
         self.data: bytes | None = None
         self._heard = 0.0
         self._period = graph.base_period
-        self._texts = ValueTexts(placed.graph, layout, self.own)
+        self.texts = ValueTexts(placed.graph, layout, self.own)
         self._digest = digest(layout, graph)
         self._last: _LastMessage | None = None
 
@@ -173,7 +185,7 @@ class _Part:
         self._heard = time.monotonic()
         self.data = data
 
-    def now(self) -> dict[str, Any]:
+    def now(self, charted: Sequence[str]) -> dict[str, Any]:
         """State and, once the part was heard, what it shows."""
         data, moment = self.data, time.monotonic()
         if data is None:
@@ -190,7 +202,7 @@ class _Part:
         if about.digest != self._digest:
             return {"state": "unheard", "said": "runs another graph"}
         state, said = self._state(about, moment)
-        return {"state": state, "said": said, **self._shown(about)}
+        return {"state": state, "said": said, **self._shown(about, charted)}
 
     def _state(self, about: PartWindow, moment: float) -> tuple[str, str]:
         assert self._last is not None
@@ -205,7 +217,7 @@ class _Part:
             return "still", f"has made no tick for {still:.1f} s"
         return "running", ""
 
-    def _shown(self, about: PartWindow) -> dict[str, Any]:
+    def _shown(self, about: PartWindow, charted: Sequence[str]) -> dict[str, Any]:
         look = about.look
         lines = [f"tick {look.tick}, {look.tick * self._period:.3f} s"]
         lines.append(tick_text(look.stamps, self._period))
@@ -215,8 +227,9 @@ class _Part:
         return {
             "tick": look.tick,
             "line": ", ".join(line for line in lines if line),
-            "values": self._texts.all(look.bus),
-            "brief": self._texts.brief(look.bus),
+            "charted": self.texts.numbers(look.bus, charted),
+            "values": self.texts.all(look.bus),
+            "brief": self.texts.brief(look.bus),
             "times": {path: text for path, text in times.items() if path in self.own},
             "late": {p: count for p, count in look.late.items() if count and p in self.own},
             "changes": look.changes,

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from math import isfinite
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ....logs.viewing.signal_names import value_text
+from ....logs.file.format import RecordedField
+from ....logs.viewing.signal_names import element_names, value_text
+from ....runtime.language.errors import AloftError
 from ....runtime.language.layout import Layout
+from ....runtime.language.quantities import Quantity
 from ....runtime.language.stages import CheckedGraph
 from ....runtime.live.window import WindowContents
+from ....runtime.running.lateness import duration
 
 FEW = 2
 """Numbers of a port that stand beside its wire."""
+MOST_LINES = 16
+"""Elements of a field that a strip chart draws; of a longer field the first."""
 
 
 class ValueTexts:
@@ -31,27 +37,38 @@ class ValueTexts:
         self, graph: CheckedGraph, layout: Layout, paths: Collection[str] | None = None
     ) -> None:
         self._layout = layout
-        self._fields: list[_Field] = []
+        self._robot = graph.robot
+        self._fields: list[RecordedField] = []
         for spec in graph.blocks:
             if paths is not None and spec.path not in paths:
                 continue
             for port, output in spec.block_type.outputs.items():
                 for name, field in output.signal.fields.items():
                     quantity = spec.quantities.get(f"{port}.{name}")
-                    unit = quantity.unit if quantity is not None else field.unit
-                    text = "" if unit is None or str(unit) == "1" else str(unit)
-                    names = {int(value): value.name.lower() for value in field.values or ()}
-                    self._fields.append(_Field(f"{spec.path}.{port}", name, text, names))
+                    quantity = quantity or Quantity(field.unit, field.frame)
+                    slot = layout.slots[f"{spec.path}.{port}.{name}"]
+                    self._fields.append(
+                        RecordedField(
+                            name=f"{spec.path}.{port}.{name}",
+                            dtype=slot.section,
+                            start=slot.start,
+                            shape=slot.shape,
+                            dimensions=field.shape,
+                            unit="" if quantity.unit_text == "1" else quantity.unit_text,
+                            frame=quantity.frame,
+                            values={int(v): v.name.lower() for v in field.values or ()},
+                        )
+                    )
+        self._by_name = {field.name: field for field in self._fields}
 
     def all(self, bus: NDArray[np.uint8]) -> dict[str, str]:
         """Every field of every output, by ``block.port.field``."""
         found = {}
         for field in self._fields:
-            full_name = f"{field.port}.{field.name}"
-            value = self._layout.view(bus, full_name)
-            named = field.named(value)
-            found[full_name] = (
-                f"{value.item()} ({named})" if named else value_text(value, field.unit)
+            value = self._layout.view(bus, field.name)
+            named = _named(field, value)
+            found[field.name] = (
+                f"{value.item()} ({named})" if named else value_text(value, field.unit or "")
             )
         return found
 
@@ -59,24 +76,75 @@ class ValueTexts:
         """Return the first numbers of the first field of every output, by ``block.port``."""
         found: dict[str, str] = {}
         for field in self._fields:
-            if field.port not in found:
-                value = self._layout.view(bus, f"{field.port}.{field.name}")
-                found[field.port] = field.named(value) or _brief(value, field.unit)
+            port = field.name.rpartition(".")[0]
+            if port not in found:
+                value = self._layout.view(bus, field.name)
+                found[port] = _named(field, value) or _brief(value, field.unit or "")
         return found
 
+    def numbers(self, bus: NDArray[np.uint8], names: Sequence[str]) -> dict[str, list[Any]]:
+        """Return the first ``MOST_LINES`` numbers of the fields that are known here, by name.
 
-@dataclass(frozen=True)
-class _Field:
-    """A field of an output; ``names`` are those of its values, if it is one of a choice."""
+        What is not finite is ``None``, which a chart leaves out.
+        """
+        found: dict[str, list[Any]] = {}
+        for name in names:
+            if name in self._by_name:
+                flat = np.ravel(self._layout.view(bus, name))[:MOST_LINES]
+                found[name] = [x if isfinite(x) else None for x in flat.astype(float).tolist()]
+        return found
 
-    port: str
-    name: str
-    unit: str
-    names: Mapping[int, str]
+    def lines(self, name: str) -> dict[str, Any]:
+        """Describe the lines of a field in a strip chart.
 
-    def named(self, value: NDArray[Any]) -> str:
-        """Return the name of a value that has one."""
-        return self.names.get(int(value.item()), "") if self.names and value.size == 1 else ""
+        Returns:
+            Plain data: ``names`` of the elements that are drawn, ``unit``, ``values`` (the names of
+            the values of an enumeration), ``size`` (how many elements the field has).
+
+        Raises:
+            AloftError: there is no such field.
+        """
+        field = self._by_name.get(name)
+        if field is None:
+            raise AloftError(f"there is no output field {name!r} in this graph")
+        names = element_names(field, self._robot) or [str(k) for k in range(field.size)]
+        return {
+            "names": names[:MOST_LINES],
+            "unit": field.unit,
+            "values": {str(number): text for number, text in field.values.items()},
+            "size": field.size,
+        }
+
+
+def list_names(graph: CheckedGraph, block: str, length: int) -> list[str]:
+    """Name the elements of a parameter that is a list, as the block's own signals name theirs.
+
+    Args:
+        graph: the graph of the block.
+        block: its path.
+        length: the number of elements.
+
+    Returns:
+        Names of joints or axes, if all vectors of that length and of a named size among the block's
+        inputs and outputs have the same ones; else indices.
+    """
+    spec = graph.block(block)
+    found = set()
+    for name, port in (*spec.block_type.inputs.items(), *spec.block_type.outputs.items()):
+        for field_name, field in port.signal.fields.items():
+            # a named size ties the list to the vector; a vector of three says nothing of three gains
+            named = len(field.shape) == 1 and isinstance(field.shape[0], str)
+            if named and field.resolve(spec.dimensions) == (length,):
+                quantity = spec.quantities.get(f"{name}.{field_name}")
+                frame = quantity.frame if quantity is not None else field.frame
+                entry = RecordedField(field_name, "float64", 0, (length,), field.shape, frame=frame)
+                found.add(tuple(element_names(entry, graph.robot)))
+    return list(found.pop()) if len(found) == 1 else [str(k) for k in range(length)]
+
+
+def _named(field: RecordedField, value: NDArray[Any]) -> str:
+    """Return the name of a value that has one."""
+    return field.values.get(int(value.item()), "") if field.values and value.size == 1 else ""
 
 
 def _brief(value: NDArray[Any], unit: str) -> str:
@@ -131,7 +199,8 @@ def lateness_text(look: WindowContents) -> str:
     if not late.ticks:
         return ""
     text = f"{look.overruns} ticks began late, {look.skipped} periods left out"
-    return f"{text}; 99 % began within {late.p99_us:.3g} us, the latest after {late.max_us:.4g} us"
+    p99, latest = duration(late.p99_us * 1e3), duration(late.max_us * 1e3)
+    return f"{text}; 99 % began within {p99}, the latest after {latest}"
 
 
 def tick_text(stamps: Sequence[NDArray[np.int64]], period: float) -> str:
@@ -144,11 +213,3 @@ def tick_text(stamps: Sequence[NDArray[np.int64]], period: float) -> str:
     return (
         f"a tick takes {duration(median)} (longest {duration(longest)}) of {duration(period * 1e9)}"
     )
-
-
-def duration(nanoseconds: float) -> str:
-    """Format a duration with three digits and a unit that fits."""
-    for limit, scale, unit in ((1e6, 1e3, "µs"), (1e9, 1e6, "ms")):
-        if nanoseconds < 0.9995 * limit:
-            return f"{nanoseconds / scale:.3g} {unit}"
-    return f"{nanoseconds / 1e9:.3g} s"

@@ -23,12 +23,13 @@ from ..flattening.rates import check_hyperperiod, read_offset, read_period
 from .background import move_to_background
 from .block_check import BlockDraft, check_defaults, check_emit, check_fit, check_sizes, lacks_robot
 from .composite_wires import resolve_composite_wires
-from .infer_units import infer_quantities, inferred_quantities, unchecked_wires
+from .infer_units import infer_quantities, inferred_quantities, questions, unchecked_wires
 from .infer_widths import Widths
 from .inserted import insert_constant, insert_delay, read_values
 from .link_settings import check_paths, check_watchdog, read_link_settings
 from .parameter_references import resolve_references
 from .parameters import check_parameters
+from .quaternions import mark_quaternions, start_of_delay, start_parameters
 from .settings import Settings, read_settings
 from .signal_errors import insert_signal_errors
 from .wire_check import WireCheck
@@ -54,6 +55,7 @@ def check_graph(graph: FlatGraph, problems: Problems) -> CheckedGraph | None:
     wires = WireCheck(graph, drafts, problems)
     values: dict[str, Any] = {}
     infer_quantities(drafts, problems)
+    mark_quaternions(drafts)
     check_sizes(graph, drafts, problems)
     for draft in drafts.values():
         wires.check(draft)
@@ -345,6 +347,7 @@ def _assemble(
                 wire = replace(wire, source=f"{specs[-1].path}.y")
             elif flat_wire.delay:
                 source = drafts[flat_wire.source_block]
+                given = start_of_delay(source, flat_wire.source_port, given)
                 specs.append(insert_delay(draft, name, flat_wire, source, given))
                 wire = replace(
                     wire, source=f"{specs[-1].path}.y", delay=flat_wire.delay, initial=given
@@ -354,7 +357,7 @@ def _assemble(
             BlockSpec(
                 flat.path,
                 draft.block_type,
-                draft.params,
+                start_parameters(draft),
                 wires,
                 draft.dimensions,
                 draft.period_ticks,
@@ -382,5 +385,5 @@ def _assemble(
         clock=settings.clock,
         file=graph.file,
         overrides=graph.overrides,
-        unchecked=tuple(unchecked_wires(drafts)),
+        unchecked=(*unchecked_wires(drafts), *questions(drafts)),
     )

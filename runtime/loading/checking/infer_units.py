@@ -7,7 +7,14 @@ from collections.abc import Iterator, Mapping
 
 from ....files.problems import Code, Problems
 from ...language.block import Block
-from ...language.quantities import UNCHECKED, InputQuantities, Quantity, quantity_of
+from ...language.flat_graph import FlatBlock
+from ...language.quantities import (
+    UNCHECKED,
+    Disagreement,
+    InputQuantities,
+    Quantity,
+    quantity_of,
+)
 from ...language.unit_algebra import over
 from .block_check import BlockDraft
 from .inserted import own_unit
@@ -29,7 +36,7 @@ def infer_quantities(drafts: Mapping[str, BlockDraft], problems: Problems) -> No
     for path, draft in drafts.items():
         if draft.block_type is not None and draft.params is not None:
             inputs, answers = inference.final.get(path) or inference.ask(draft)
-            _check(draft, inputs, answers, problems)
+            _check(drafts, draft, inputs, answers, problems)
 
 
 class _QuantityInference:
@@ -188,11 +195,29 @@ def unchecked_wires(drafts: Mapping[str, BlockDraft]) -> Iterator[str]:
                 continue
             for field_name, field in draft.inputs[name].signal.fields.items():
                 arrives = quantity_at_input(drafts, draft, name, field_name)
-                if field.unit is not None and arrives is not None and arrives.unit is None:
+                if field.unit is None or arrives is None:
+                    continue
+                if None in arrives.units(1):
                     yield (
                         f"{wire.shown or wire.source} does not say its unit, and {path}.{name} reads "
                         f"{field_name} in {Quantity(field.unit)}"
                     )
+
+
+def questions(drafts: Mapping[str, BlockDraft]) -> Iterator[str]:
+    """Yield a text for every input that joins unlike units where its block takes them for one."""
+    for path, draft in drafts.items():
+        quantities = {
+            f"{name}.{field_name}": arrives
+            for name, port in draft.inputs.items()
+            for field_name in port.signal.fields
+            if (arrives := quantity_at_input(drafts, draft, name, field_name)) is not None
+        }
+        if any(quantity.elements for quantity in quantities.values()):
+            inputs = InputQuantities(quantities)
+            inferred_outputs(draft, inputs)
+            for name, fix in inputs.questions:
+                yield f"{path}.{name.partition('.')[0]} joins {quantities[name]} in one vector: {fix}"
 
 
 def inferred_outputs(draft: BlockDraft, inputs: InputQuantities) -> Answers:
@@ -222,7 +247,11 @@ def inferred_outputs(draft: BlockDraft, inputs: InputQuantities) -> Answers:
 
 
 def _check(
-    draft: BlockDraft, inputs: InputQuantities, answers: Answers, problems: Problems
+    drafts: Mapping[str, BlockDraft],
+    draft: BlockDraft,
+    inputs: InputQuantities,
+    answers: Answers,
+    problems: Problems,
 ) -> None:
     """Report inputs of a block that disagree, or an output that contradicts what a ring assumed
     before."""
@@ -245,7 +274,8 @@ def _check(
             other_where=flat.wires[other].where if other in flat.wires else None,
             expected=_named(item.expected) if item.expected else "",
             found=_named(item.found),
-            fix=_conversion(item.found, item.expected) if item.expected else "",
+            fix=_unit_of_source(drafts, flat, item, other)
+            or (_conversion(item.found, item.expected) if item.expected else ""),
         )
     for name, answer in answers.items():
         known = draft.quantities.get(name)
@@ -266,8 +296,23 @@ def _check(
         )
 
 
+def _unit_of_source(
+    drafts: Mapping[str, BlockDraft], flat: FlatBlock, item: Disagreement, other: str
+) -> str:
+    """Return the fix where plain numbers come from a block that can be told their unit."""
+    if item.expected is None or item.found.unit is None or other not in flat.wires:
+        return ""
+    if str(item.expected.unit) != "1" or item.found.elements:
+        return ""
+    source = drafts.get(flat.wires[other].source.rpartition(".")[0])
+    params = source.params if source is not None else None
+    if source is None or getattr(params, "unit", None) != "":
+        return ""
+    return f"say what {source.flat.path}'s numbers are: with: {{unit: {item.found.unit}}}"
+
+
 def _units_differ(a: Quantity, b: Quantity) -> bool:
-    return a.unit is not None and b.unit is not None and not a.unit.matches(b.unit)
+    return not a.units_agree(b)
 
 
 def _named(quantity: Quantity) -> str:
@@ -278,6 +323,8 @@ def _named(quantity: Quantity) -> str:
 
 
 def _conversion(found: Quantity, expected: Quantity) -> str:
+    if found.elements or expected.elements:
+        return ""
     if found.unit is None or expected.unit is None or found.unit.matches(expected.unit):
         return f"turn it into {expected.frame} with blocks.RotateVector" if expected.frame else ""
     if found.unit.same_dimension(expected.unit):

@@ -42,6 +42,20 @@ class GatherPiece:
     numbers: tuple[float, ...] = ()
     start: int = 0
 
+    def places(self) -> list[int]:
+        """Return the elements of the target that it writes, in the order of the source."""
+        if self.numbers:
+            return list(range(self.start, self.start + len(self.numbers)))
+        return [to + k for _, to, length in self.copies for k in range(length)]
+
+    def quantity(self, whole: Quantity | None) -> Quantity | None:
+        """Return the quantity of the elements that it takes of a source."""
+        if whole is None or not whole.elements:
+            return whole
+        taken = (first + k for first, _, length in self.copies for k in range(length))
+        size = len(whole.elements)
+        return Quantity.of((whole.elements[k % size] for k in taken), whole.frame)
+
 
 class Gather(Block):
     """Copies parts of its inputs into one signal; a wire such as ``u: robot.joints.position`` is one.
@@ -62,26 +76,38 @@ class Gather(Block):
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """Infer the common quantity of the parts of a field.
 
-        They must have the quantity of the reader. If it takes any and they differ, the unit of the
-        whole is not checked.
+        They must have the quantity of the reader. If it takes any and they differ, each element of a
+        vector keeps its own unit; a matrix's are not checked.
         """
         return {f"y.{name}": cls._quantity(name, inputs) for name in cls.wanted}
 
     @classmethod
     def _quantity(cls, target: str, inputs: InputQuantities) -> Quantity | None:
         wanted = cls.wanted[target]
-        names = [f"{p.port}.{p.field}" for p in cls.pieces if p.target == target and p.port]
-        found = [inputs[name] for name in names]
+        pieces = [piece for piece in cls.pieces if piece.target == target]
+        found = {p: p.quantity(inputs[f"{p.port}.{p.field}"]) for p in pieces if p.port}
         if wanted is not None:
-            for name in names:
-                inputs.agree(name, wanted, f"the reader's {target} is {wanted}")
+            for piece, quantity in found.items():
+                name = f"{piece.port}.{piece.field}"
+                inputs.agree(name, wanted, f"the reader's {target} is {wanted}", quantity)
             return wanted
-        known = [quantity for quantity in found if quantity is not None]
+        known = [quantity for quantity in found.values() if quantity is not None]
         if len(known) < len(found):
             return None
-        numbers = any(any(p.numbers) for p in cls.pieces if p.target == target)
-        same = all(quantity == known[0] for quantity in known) and not numbers
-        return known[0] if known and same else UNCHECKED
+        plain = any(any(piece.numbers) for piece in pieces)  # zero is zero in every unit
+        first = known[0] if known else UNCHECKED
+        if not plain and not first.elements and all(each == first for each in known):
+            return first
+        if len(cls.outputs["y"].signal.fields[target].shape) != 1:
+            return UNCHECKED
+        units: dict[int, Unit | None] = {}
+        for piece in pieces:
+            quantity = found.get(piece) or UNCHECKED
+            units.update(zip(piece.places(), quantity.units(len(piece.places())), strict=True))
+        frames = {each.frame for each in known}
+        return Quantity.of(
+            (units[k] for k in sorted(units)), first.frame if len(frames) == 1 else None
+        )
 
     def setup(self) -> None:
         """Write the numbers, and make a call for every stretch."""

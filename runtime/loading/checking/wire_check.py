@@ -11,7 +11,7 @@ from ....files.nodes import text_of
 from ....files.problems import Code, Problems, listing, nearest
 from ...language.block import Input, Output
 from ...language.flat_graph import FlatGraph, FlatWire
-from ...language.quantities import UNCHECKED, quantity_of
+from ...language.quantities import UNCHECKED, Quantity, quantity_of
 from ...language.signals import Field, Signal
 from ...language.unit_algebra import over
 from ...language.units import Unit
@@ -327,7 +327,14 @@ def compare(
                 _shape_text(given, found),
             )
         quantity = source.quantity(output.name, name)
-        yield from _compare_units(name, quantity.unit, wanted, _says_unit(source))
+        if quantity.elements and wanted.unit is not None:
+            if not quantity.units_agree(Quantity(wanted.unit)):
+                yield Mismatch(
+                    Code.UNIT, f"field {name!r} joins unlike quantities", str(wanted.unit), str(quantity),
+                    "select the elements that are meant, as in block.port.field[0]",
+                )  # fmt: skip
+        else:
+            yield from _compare_units(name, quantity.unit, wanted, _says_unit(source))
         if quantity.frame and wanted.frame and quantity.frame != wanted.frame:
             yield Mismatch(
                 Code.FRAME,

@@ -12,6 +12,7 @@ from aloft.planner.library.library import SHIPPED, PlanLibrary
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 from aloft.runtime.language.errors import AloftError
+from aloft.runtime.loading import check
 from aloft.runtime.testing import BlockBench
 
 
@@ -35,6 +36,19 @@ def test_it_plays_the_shipped_plan_through() -> None:
     assert max(heights) - heights[0] == pytest.approx(0.15, abs=1e-3)
     assert float(reference.foot_position[:, 0].mean()) == pytest.approx(0.1, abs=2e-3)
     np.testing.assert_allclose(reference.com_velocity, 0.0, atol=1e-3)
+
+
+@pytest.mark.parametrize(("rise", "count"), [("8.13cm", 1), ("12cm", 0)])
+def test_a_task_without_a_plan_is_refused_at_load_where_none_can_be_made(
+    monkeypatch: pytest.MonkeyPatch, rise: str, count: int
+) -> None:
+    monkeypatch.setattr("aloft.runtime.language.errors.find_spec", lambda module: None)
+    problems = check("aloft:jump", [f"plan.task.rise={rise}"]).problems
+    assert [problem.at for problem in problems] == ["plan.task"] * count
+    for problem in problems:
+        assert "no stored plan is for the task" in problem.message
+        assert problem.message.endswith("planning a jump needs the library casadi")
+        assert problem.fix.startswith("pip install")
 
 
 def test_an_inline_task_that_is_not_kept_is_refused_without_a_solver() -> None:

@@ -86,6 +86,39 @@ def test_steps_with_contacts_are_those_without_it() -> None:
     np.testing.assert_array_equal(ends[0], ends[1])
 
 
+def test_a_touchdown_within_a_step_acts_from_the_next_one_on() -> None:
+    """Else its blow would change the velocity unseen by the accelerometer, which shows the step's beginning."""
+    model = build_mujoco_model(BRUCE, timestep=STEP)
+    data = mujoco.MjData(model)
+    data.qpos[7:], data.qvel[2] = BRUCE.standing_position, -1.5
+    data.qpos[2] = 1e-4 - float(np.min(standing_heights(BRUCE)))
+    first, second = step_calls(model, data)
+    first.run()
+    assert not data.ncon
+    for call in (*flight_step_calls(model, data, second), first):
+        call.take_turn()
+    assert data.ncon, "the feet are in the ground by 0.65 mm"
+    assert data.qvel[2] == pytest.approx(-1.5 - 9.81 * STEP, abs=1e-4)
+
+
+def test_the_flight_has_the_friction_of_the_present() -> None:
+    """Effects of a trial change it while it runs."""
+    ends = []
+    for changed in (False, True):
+        model = build_mujoco_model(BRUCE, timestep=STEP)
+        data = mujoco.MjData(model)
+        data.qpos[2], data.qpos[7:], data.qfrc_applied[6:] = 2.0, BRUCE.standing_position, 5.0
+        first, second = step_calls(model, data)
+        if not changed:
+            model.dof_frictionloss[6:] = 3.0
+        calls = flight_step_calls(model, data, second)
+        model.dof_frictionloss[6:] = 3.0
+        for call in (first, *calls):
+            call.take_turn()
+        ends.append(data.qvel.copy())
+    np.testing.assert_array_equal(ends[0], ends[1])
+
+
 def test_a_robot_falls_with_either() -> None:
     heights = []
     for integrator in ("implicitfast", "RK4"):

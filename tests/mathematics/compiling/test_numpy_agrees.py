@@ -64,6 +64,19 @@ def moving(b: Array1D, k: int, y: Array1D) -> None:
 
 
 @kernel
+def beyond_the_end(b: Array1D, k: int, y: Array1D, r: Array1D) -> None:
+    """Slices whose end, or all of which, lies beyond an array of open size."""
+    y[1:7] = 2.0 * b[1:7]
+    y[4:9] += 1.0
+    y[k : k + 4] -= b[k : k + 4]
+    y[8:9] = 5.0
+    r[0], r[1] = np.sum(b[3:8]), sum(b[k : k + 9])
+    r[2] = (b[2:9] * b[2:9]).max() + b[k + 1 : k + 7] @ b[k + 1 : k + 7]
+    r[3] = np.sum(b[k : k + 1] * b[0:3]) + np.sum(np.ones(1) + b)
+    r[4] = (b - np.dot(b[:0:-3], b[:0:-3])).max() + np.abs(b * np.sum(b[::-1])).min()
+
+
+@kernel
 def columns(A: Array2D, y: Array1D, B: Matrix3) -> None:
     """Slices in two dimensions, and of a transpose."""
     y[:] = A[::-1, 0] - A.T[1, ::-1]
@@ -106,6 +119,7 @@ def test_statements_are_numpys() -> None:
     three(steps, a, b, np.arange(6.0))
     for k in (1, 2, 3):
         three(moving, b, k, np.arange(6.0))
+        three(beyond_the_end, np.arange(6.0), k, np.arange(6.0), np.zeros(5))
     three(moving, b, -2, np.arange(6.0))
     three(columns, A, np.zeros(3), np.ones((3, 3)))
     three(own_elements, a, A)
@@ -194,6 +208,55 @@ def test_numbers_out_of_range_end_the_run_and_never_wrap(
     with pytest.raises(error, match=text):
         call.run()
     assert call.arguments[0].tolist() == values
+
+
+@kernel
+def too_short(b: Array1D, k: int, y: Vector3) -> None:
+    y[:] = y - b[k : k + 3]
+
+
+@kernel
+def too_short_a_copy(b: Array1D, k: int, y: Vector3) -> None:
+    t = b[k : k + 2].copy()
+    y[0] = t[0]
+
+
+@kernel
+def too_short_a_factor(b: Array1D, k: int, y: Vector3) -> None:
+    y[0] = y @ b[k:8]
+
+
+@kernel
+def repeated_by_numpy(b: Array1D, k: int, y: Vector3) -> None:
+    y[0] = np.sum(y * b[k:6])
+
+
+@kernel
+def empty(b: Array1D, k: int, y: Vector3) -> None:
+    y[0] = np.sum(y * b[k + 1 : k + 2])
+
+
+@pytest.mark.parametrize(
+    ("function", "most"),
+    [(too_short, 3), (too_short_a_copy, 4), (too_short_a_factor, 3), (empty, 4)],
+)
+def test_slices_that_are_too_short_end_the_run_in_all_tiers(function: Any, most: int) -> None:
+    three(function, np.arange(6.0), most, np.ones(3))
+    for k in (most + 1, most + 2):
+        y = np.ones(3)
+        with pytest.raises(IndexError, match=r"a slice of . elements stands where . are"):
+            function(np.arange(6.0), k, y)
+        call = KernelCall(function, np.arange(6.0), k, y)
+        assert compile_calls([call]) == ""
+        with pytest.raises(IndexError, match="slice of another length than what it is combined"):
+            call.run()
+        assert y.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_a_slice_that_numpy_would_repeat_ends_the_run() -> None:
+    untouched(repeated_by_numpy)(np.arange(6.0), 5, np.ones(3))
+    with pytest.raises(IndexError, match=r"a slice of . elements stands where . are"):
+        repeated_by_numpy(np.arange(6.0), 5, np.ones(3))
 
 
 def test_whole_numbers_at_the_limit_are_exact() -> None:

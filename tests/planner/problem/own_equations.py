@@ -25,11 +25,12 @@ def paper_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> dict[str, flo
 
     Units: m, rad or m/s for ``integration`` (a quaternion's components count as rad), m/s^2 for
     ``linear momentum rate``, N m s for ``angular momentum rate`` and ``h = A(q) v``, m for the
-    kinematics, N for ``friction``.
+    kinematics and what is raised, N for ``friction`` and forces.
     """
     found = dict.fromkeys(
         ("integration", "linear momentum rate", "angular momentum rate", "h = A(q) v",
-         "r = f_com(q)", "c = f_contact(q)", "friction"), 0.0,
+         "r = f_com(q)", "c = f_contact(q)", "force of a raised point", "raised points above the ground", "friction"),
+        0.0,
     )  # fmt: skip
 
     def note(name: str, value: Array) -> None:
@@ -39,7 +40,6 @@ def paper_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> dict[str, flo
     places = {False: dynamics.points(q[0]), True: dynamics.points(q[-1])}
     for k in range(1, len(plan.time)):
         dt = float(plan.time[k] - plan.time[k - 1])
-        grounded = plan.phase[k - 1] != Phase.FLIGHT
         landed = plan.time[k] > plan.touchdown_time - 1e-9
         v, force = plan.velocity[k], plan.contact_force[k - 1]
         turn = matrices_of_quaternions(q[k, None, 3:7])[0]
@@ -57,8 +57,12 @@ def paper_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> dict[str, flo
         com, _, angular = dynamics.centroidal(q[k], v)
         note("h = A(q) v", h[k] - angular)
         note("r = f_com(q)", r[k] - com)
-        if grounded or k == len(plan.time) - 1 or np.isclose(plan.time[k], plan.touchdown_time):
-            note("c = f_contact(q)", dynamics.points(q[k]) - places[landed])
+        held = plan.contact[k - 1] | plan.contact[k]
+        if held.any():
+            note("c = f_contact(q)", (dynamics.points(q[k]) - places[landed])[held])
+            under = places[landed][:, 2] - dynamics.points(q[k])[:, 2]
+            note("raised points above the ground", np.maximum(under, 0.0))
+        note("force of a raised point", np.where(plan.contact[k - 1][:, None], 0.0, force))
         excess = np.hypot(force[:, 0], force[:, 1]) - plan.task.friction * force[:, 2]
         note("friction", np.maximum(excess, 0.0))
     return found

@@ -190,6 +190,38 @@ def test_the_papers_boundary_set_may_bound_attitude_velocity_force_and_momentum(
 
 
 @pytest.mark.long
+def test_the_papers_problem_takes_its_contact_sequence_from_the_task() -> None:
+    phases = [
+        {"phase": "squat", "time": 0.4, "knots": 8},
+        {"phase": "thrust", "time": 0.21, "knots": 7},
+        {"phase": "thrust", "time": 0.04, "knots": 2, "contacts": "toe"},
+        {"phase": "flight", "knots": 11},
+        {"phase": "landing", "time": 0.5, "knots": 9},
+    ]
+    values = {"recipe": "paper", "name": "toes", "formulation": "paper", "rise": 0.1}
+    plan = solve_jump(make_task(values | {"phases": phases}), ROBOT)
+    assert {name: size for name, size in own_residuals(plan, ROBOT).items() if size > 1e-6} == {}
+    heels = [c.name.endswith("heel") for c in ROBOT.contacts]
+    up = knot(plan, plan.lift_off_time)
+    assert plan.contact[: up - 2].all()
+    assert (plan.contact[up - 2 : up] == ~np.array(heels)).all()
+    height = DYNAMICS.points(plan.position[up])[:, 2] - DYNAMICS.points(plan.position[0])[:, 2]
+    assert height[heels].min() > 1e-3 > np.abs(height[~np.array(heels)]).max()
+    # The legs are longer on their toes, so no joint has to be as fast at lift-off.
+    flat = solve_jump(make_task(values | {"knots": {**COARSE, "thrust": 9, "flight": 11}}), ROBOT)
+    fastest = [np.abs(p.velocity[knot(p, p.lift_off_time), 6:]).max() for p in (plan, flat)]
+    assert fastest[0] < 0.8 * fastest[1]
+
+
+@pytest.mark.parametrize("formulation", ["paper", "srbm"])
+def test_a_phase_without_time_is_refused_by_its_name(formulation: str) -> None:
+    task = make_task({"recipe": "paper", "name": "odd", "rise": 0.1, "formulation": formulation,
+                      "squat_time": "free"})  # fmt: skip
+    with pytest.raises(PlanError, match="it has no squat_time: free; use formulation: full"):
+        solve_jump(task, ROBOT)
+
+
+@pytest.mark.long
 def test_the_papers_problem_starts_from_a_plan_of_a_near_task() -> None:
     near = planned("paper", "in situ")
     values = {

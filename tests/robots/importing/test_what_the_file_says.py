@@ -231,3 +231,17 @@ def test_a_thing_beside_the_robot_is_no_second_robot(tmp_path: Path) -> None:
     found = read_text(tmp_path, HELD.replace("</worldbody>", ball))
     assert found.description.base == "trunk"
     assert "left out: bodies beside the robot: ball" in found.notes
+
+
+@pytest.mark.parametrize("declared", ["", '<link name="world"/>'])
+def test_a_robot_that_hangs_from_the_world_is_fixed_declared_or_not(
+    declared: str, tmp_path: Path
+) -> None:
+    links = "".join(LINK.format(name=name, mass=1, more="") for name in ("base", "arm"))
+    weld = '<joint name="weld" type="fixed"><parent link="world"/><child link="base"/></joint>'
+    hinge = JOINT.format(name="hinge", parent="base", child="arm", more="")
+    found = read_text(tmp_path, f'<robot name="r">{declared}{links}{weld}{hinge}</robot>')
+    assert found.description.base_joint == "fixed"
+    assert [joint.name for joint in found.description.joints] == ["hinge"]
+    said = any("which the URDF does not declare: it is the ground" in note for note in found.notes)
+    assert said == (not declared)

@@ -257,3 +257,100 @@ blocks:
     (problem,) = caught.value.report.problems
     assert (problem.expected, problem.found) == ("rad", found)
     assert problem.fix.startswith(fix) if fix else "say what" not in problem.fix
+
+
+def test_a_plain_source_beside_a_measurement_is_asked_for_its_unit() -> None:
+    text = """
+rate: 100 Hz
+blocks:
+  target: {use: blocks.SineWave}
+  angle: {use: blocks.SineWave, with: {unit: rad}}
+  pid: {use: blocks.PID, in: {setpoint: target.y, measured: angle.y}}
+"""
+    with pytest.raises(LoadError) as caught:
+        checked_text(text, Path("graph.yaml"))
+    (problem,) = caught.value.report.problems
+    assert (problem.expected, problem.found) == ("plain numbers", "rad")
+    assert problem.fix == "say what target's numbers are: with: {unit: rad}"
+    checked_text(text.replace("SineWave}", "SineWave, with: {unit: rad}}"), Path("graph.yaml"))
+
+
+UNLIKE = """\
+  v: {use: blocks.Constant, with: {value: [3 V]}}
+  w: {use: blocks.Constant, with: {value: [1 rad/s]}}
+  i: {use: blocks.Constant, with: {value: [2 A]}}
+  m: {use: blocks.Mux, in: {a: v.y, b: w.y}}
+  d: {use: blocks.Demux, with: {n_a: 1, n_b: 1}, in: {u: m.y}}
+  s2: {use: blocks.Selector, with: {elements: [1, 1]}, in: {u: m.y}}
+"""
+SYSTEM = "time: continuous, a: [[-1, 0], [0, -2]], b: [[1, 0], [0, 1]], c: [[1, 0], [0, 1]]"
+
+
+@pytest.mark.parametrize(
+    ("blocks", "expected", "found"),
+    [
+        ("  e: {use: blocks.Sum, in: {a: m.y, b: {value: {value: [1 V, 2 V]}}}}\n", "[V, rad/s]", "V"),
+        ("  e: {use: blocks.Sum, in: {a: m.y, b: [v.y, i.y]}}\n", "[V, rad/s]", "[V, A]"),
+        ("  e: {use: blocks.Sum, in: {a: d.b, b: v.y}}\n", "rad/s", "V"),
+        ("  e: {use: blocks.Sum, in: {a: s2.y, b: [w.y, i.y]}}\n", "rad/s", "[rad/s, A]"),
+        ("  e: {use: blocks.Sum, in: {a: 'm.y.value[1]', b: v.y}}\n", "rad/s", "V"),
+        ("  e: {use: blocks.Sum, in: {a: ['m.y.value[1]', v.y], b: [w.y, i.y]}}\n", "[rad/s, V]", "[rad/s, A]"),
+        ("  g: {use: blocks.Integrator, in: {u: m.y}}\n  e: {use: blocks.Sum, in: {a: g.y, b: m.y}}\n",
+         "[V s, rad]", "[V, rad/s]"),
+        (("  p: {use: blocks.Product, in: {a: m.y, b: [i.y, i.y]}}\n"
+         "  e: {use: blocks.Sum, in: {a: p.y, b: m.y}}\n"), "[V A, rad A/s]", "[V, rad/s]"),
+        (f"  x: {{use: blocks.StateSpace, with: {{{SYSTEM}, input_units: [V, A]}}, in: {{u: m.y}}}}\n",
+         "[V, A]", "[V, rad/s]"),
+        ((f"  x: {{use: blocks.StateSpace, with: {{{SYSTEM}, input_units: [V, rad/s], output_units: [A, rad]}},"
+         " in: {u: m.y}}\n  e: {use: blocks.Sum, in: {a: 'x.y.value[0]', b: v.y}}\n"), "A", "V"),
+        (("  x: {use: blocks.TransferFunction, with: {numerator: [1], denominator: [1, 1], input_units: V,"
+         " output_units: rad/s}, in: {u: i.y}}\n"), "V", "A"),
+        (("  x: {use: blocks.TransferFunction, with: {numerator: [1], denominator: [1, 1], input_units: V,"
+         " output_units: rad/s}, in: {u: v.y}}\n  e: {use: blocks.Sum, in: {a: x.y, b: v.y}}\n"), "rad/s", "V"),
+        (("  x: {use: blocks.MatrixGain, with: {matrix: [[1, 2]], input_units: [V, rad/s], output_units: A},"
+         " in: {u: m.y}}\n  e: {use: blocks.Sum, in: {a: x.y, b: v.y}}\n"), "A", "V"),
+        (("  x: {use: blocks.Expression, with: {expression: 2 * a}, in: {a: m.y}}\n"
+         "  e: {use: blocks.Sum, in: {a: 'x.y.value[1]', b: v.y}}\n"), "rad/s", "V"),
+    ],
+)  # fmt: skip
+def test_elements_with_unlike_units_keep_their_own(
+    tmp_path: Path, blocks: str, expected: str, found: str
+) -> None:
+    problem = one(tmp_path, UNLIKE + blocks)
+    assert (problem.code, problem.expected, problem.found) == ("unit", expected, found)
+
+
+@pytest.mark.parametrize("use", ["StateSpace", "MatrixGain"])
+def test_unlike_units_in_one_vector_are_questioned_until_it_is_said(
+    tmp_path: Path, use: str
+) -> None:
+    head = "rate: 100 Hz\nblocks:\n" + UNLIKE
+    given = SYSTEM if use == "StateSpace" else "matrix: [[1, 2]]"
+    block = "  x: {{use: blocks.{}, with: {{{}}}, in: {{u: m.y}}}}\n"
+    asked = checked_text(head + block.format(use, given), tmp_path / "graph.yaml").unchecked
+    said = "input_units: [V, rad/s]"
+    assert asked == (f"x.u joins [V, rad/s] in one vector: if that is meant, say so: {said}",)
+    answered = block.format(use, f"{given}, {said}")
+    assert checked_text(head + answered, tmp_path / "graph.yaml").unchecked == ()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("input_units: [V, V, V]", "input_units has 3 units for 2 elements"),
+        ("output_units: [V]", "output_units has 1 units for 2 elements"),
+        ("unit: V, output_units: V", "unit and output_units both say what the outputs are"),
+        ("input_units: furlong", "furlong"),
+    ],
+)
+def test_units_of_elements_that_do_not_fit(tmp_path: Path, given: str, message: str) -> None:
+    block = f"  x: {{use: blocks.StateSpace, with: {{{SYSTEM}, {given}}}, in: {{u: [v.y, v.y]}}}}\n"
+    assert message in one(tmp_path, UNLIKE + block).message
+
+
+def test_a_rotation_mixes_elements(tmp_path: Path) -> None:
+    blocks = """\
+  q: {use: blocks.Constant, with: {value: [0, 0, 0, 1]}}
+  r: {use: blocks.RotateVector, in: {rotation: q.y, u: [v.y, w.y, i.y]}}
+"""
+    assert "a rotation mixes its elements" in one(tmp_path, UNLIKE + blocks).message

@@ -92,6 +92,21 @@ def test_the_time_of_a_pause_is_no_lost_time() -> None:
     assert (time.instant - began) / MS == pytest.approx(10.0, abs=0.1), "and then in periods"
 
 
+def test_a_playback_rate_stretches_the_periods() -> None:
+    time = PollingTime()
+    pacer = Paced(100.0, time, 0.1)
+    pacer.wait(0)
+    pacer.play(0.2)
+    began = time.instant
+    assert pacer.wait(1) == 0 and pacer.wait(2) == 0
+    assert (time.instant - began) / MS == pytest.approx(50.0, abs=0.1)
+    pacer.play(1.0)
+    began = time.instant
+    assert pacer.wait(3) == 0 and pacer.wait(4) == 0
+    assert (time.instant - began) / MS == pytest.approx(10.0, abs=0.1)
+    assert (pacer.lateness.late, pacer.skipped_periods) == (0, 0)
+
+
 def test_ticks_begin_at_whole_periods() -> None:
     result = paced(ClockSpec("paced"), [2], 1.5).run()
     assert begun_ms() == [0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0]

@@ -159,7 +159,7 @@ def test_the_oldest_snapshots_make_room() -> None:
         run.go(75)
         assert run.wait() == {
             "paused": True, "tick": 75, "kept": [0, 60, 70, 75], "room": 4, "interval": 10,
-            "over": "", "problem": "",
+            "over": "", "problem": "", "percent": 100,
         }  # fmt: skip
         assert run.control.go_back(59) == 0, "the start is always there"
         run.go(25)
@@ -198,6 +198,20 @@ def test_without_pauses_the_run_is_what_it_was() -> None:
     assert result.run_hash == uninterrupted().run_hash
     with pytest.raises(AloftError, match="the run has ended"):
         control.pause()
+
+
+def test_a_playback_rate_changes_no_byte() -> None:
+    whole = uninterrupted()
+    with running(GRAPH.replace("duration: 3 s", "duration: 3 s\nclock: {kind: paced}")) as run:
+        run.control.play(1000)
+        assert run.control.about()["percent"] == 1000
+        run.go()
+        for percent in (0, 1001):
+            with pytest.raises(AloftError, match=f"1 to 1000 % of real time, not {percent}"):
+                run.control.play(percent)
+        assert run.end().run_hash == whole.run_hash
+    with running() as run, pytest.raises(AloftError, match=r"--set clock\.kind=paced"):
+        run.control.play(50)
 
 
 def test_what_is_refused() -> None:

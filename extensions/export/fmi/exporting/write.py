@@ -18,6 +18,7 @@ from .....logs.file.dependencies import named_file
 from .....runtime.bundle import copy_module, with_robot_beside
 from .....runtime.language.errors import AloftError
 from ...clib.cut import Cut, Terminal, cut, start_of
+from ...clib.input_delays import InputDelay
 from ...clib.part import NeedsPython
 from ...clib.write import prepare
 from .native import compiler, write_native
@@ -46,6 +47,7 @@ class Exported:
     outputs: tuple[Terminal, ...]
     problems: tuple[str, ...] | None
     python: tuple[str, ...] = ()
+    delays: tuple[InputDelay, ...] = ()
 
 
 def export(
@@ -55,6 +57,7 @@ def export(
     overrides: Sequence[str] = (),
     outputs: Sequence[str] = (),
     version: str = "3.0",
+    delays: str = "inside",
 ) -> Exported:
     """Write a graph, or a sub-graph, as an FMU for co-simulation.
 
@@ -68,6 +71,7 @@ def export(
         overrides: parameters to change.
         outputs: what the outputs are, ``block.port``; by default as ``cut`` says.
         version: of FMI, ``3.0`` or ``2.0``.
+        delays: the side of those of wires into the part, ``inside`` or ``outside``.
 
     Raises:
         LoadError: the graph may not run.
@@ -81,19 +85,20 @@ def export(
         raise AloftError(f"there is no FMI {version!r} here; there is 3.0, 2.0")
     title = f"{Path(path).stem}{f', {part}' if part else ''}, by aloft {__version__}"
     try:
-        made = prepare(path, name, part, overrides, outputs)
+        made = prepare(path, name, part, overrides, outputs, delays=delays)
         if compiler():
             write_native(made, to, version, title)
             inside = made.part.cut
             return Exported(
-                to, inside.graph.base_period, inside.inputs, inside.outputs, _validated(to)
-            )
+                to, inside.graph.base_period, inside.inputs, inside.outputs, _validated(to),
+                delays=inside.delays,
+            )  # fmt: skip
         reasons: tuple[str, ...] = ("there is no C compiler (cc)",)
     except NeedsPython as error:
         reasons = error.reasons
     if version != "3.0":
         raise AloftError("\n  ".join(("the FMU needs Python, and such are of FMI 3.0:", *reasons)))
-    return _with_python(to, cut(path, part, overrides, outputs), title, reasons)
+    return _with_python(to, cut(path, part, overrides, outputs, delays=delays), title, reasons)
 
 
 def _with_python(to: Path, cut_out: Cut, title: str, reasons: tuple[str, ...]) -> Exported:
@@ -124,7 +129,7 @@ def _with_python(to: Path, cut_out: Cut, title: str, reasons: tuple[str, ...]) -
         to.parent.mkdir(parents=True, exist_ok=True)
         shutil.move(written, to)
     found = cut_out.inputs, cut_out.outputs
-    return Exported(to, cut_out.graph.base_period, *found, _validated(to), reasons)
+    return Exported(to, cut_out.graph.base_period, *found, _validated(to), reasons, cut_out.delays)
 
 
 def _write_graph(cut_out: Cut, folder: Path, title: str) -> None:

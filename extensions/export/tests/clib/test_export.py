@@ -203,6 +203,89 @@ def test_a_live_parameter_changes_within_its_bounds(folder: Path) -> None:
 
 
 @needs_compiler
+def test_gains_of_a_pid_are_live_and_what_python_computes_from_the_rest_is_fixed(
+    folder: Path, tmp_path: Path
+) -> None:
+    made = write_library(str(folder / "mass.yaml"), tmp_path / "pd", "controller")
+    units = {each["name"]: each["unit"] for each in made.about["parameters"]}
+    gains = {
+        f"controller/pid.{key}": value for key, value in (("kp", 30.0), ("ki", 2.0), ("kd", 1.5))
+    }
+    assert [units[f"{name}[0]"] for name in gains] == ["N/m", "N/m/s", "N s/m"]
+    assert made.about["fixed_parameters"] == [
+        *(f"controller/pid.{name}" for name in ("tracking_time", "lower", "upper")),
+        *(f"controller/bound.{name}" for name in ("lower", "upper")),
+    ]
+    library = SharedLibrary(made.description)
+    for name, value in gains.items():
+        library.set(f"{name}[0]", value)
+    result = aloft.load(folder / "mass.yaml", gains).run()
+    steps = zip(
+        *(result.signal(f"{n}.value")[:, 0] for n in ("wish.y", "place.y", "controller/bound.y")),
+        strict=True,
+    )
+    for wish, place, force in steps:
+        library.inputs["wish"][...], library.inputs["measured"][...] = wish, place
+        assert (library.step(), library.outputs["force"].tolist()) == (0, [force])
+
+
+LATE = MASS.replace("measured: place.y", "measured: {from: place.y, delay: 2}")
+
+
+@needs_compiler
+@pytest.mark.parametrize("side", ["inside", "outside"])
+def test_delays_of_inputs_are_on_the_side_that_is_asked_for_and_said(
+    folder: Path, tmp_path: Path, side: str
+) -> None:
+    (tmp_path / "controller.yaml").write_text(CONTROLLER)
+    (tmp_path / "late.yaml").write_text(LATE)
+    made = write_library(str(tmp_path / "late.yaml"), tmp_path / "pd", "controller", delays=side)
+    header = (tmp_path / "pd" / "pd.h").read_text()
+    words = {
+        "inside": "controller/pid.measured reads it 0.004 s late, by a delay in here",
+        "outside": "give it 0.004 s late: controller/pid.measured has no delay in here",
+    }
+    assert words[side] in header
+    assert "every 5 ticks (100 Hz), from tick 0: controller/slow\n" in header
+    (said,) = made.about["input_delays"]
+    assert (said["sources"], said["runs"], said["side"]) == (("place.y",), 2, side)
+    library = SharedLibrary(made.description)
+    result = aloft.load(tmp_path / "late.yaml").run()
+    wish, place, force = (
+        result.signal(f"{n}.value")[:, 0] for n in ("wish.y", "place.y", "controller/bound.y")
+    )
+    late = place if side == "inside" else np.concatenate([[0.0, 0.0], place[:-2]])
+    for tick in range(len(place)):
+        library.inputs["wish"][...], library.inputs["measured"][...] = wish[tick], late[tick]
+        assert (library.step(), library.outputs["force"].tolist()) == (0, [force[tick]])
+
+
+@pytest.mark.parametrize(
+    ("reads", "message"),
+    [
+        ("{u: inputs.again}", "place.y cannot be outside: controller/more.u 0 runs late and controller/pid.measured 2"),
+        ("{u: {from: inputs.again, delay: 1}}", "controller/more.u 1 runs late and controller/pid.measured 2 runs late"),
+        ("{u: {from: [inputs.again, bound.y], delay: 1}}", "its wire joins outputs of both sides"),
+    ],
+)  # fmt: skip
+def test_delays_that_cannot_be_outside(tmp_path: Path, reads: str, message: str) -> None:
+    inside = CONTROLLER.replace("measured: }", "measured: , again: }")
+    (tmp_path / "controller.yaml").write_text(
+        f"{inside}  more: {{use: blocks.Gain, in: {reads}}}\n"
+    )
+    (tmp_path / "late.yaml").write_text(LATE.replace("in: {wish", "in: {again: place.y, wish"))
+    taken = ["controller/more.y", "controller/bound.y"]
+    with pytest.raises(AloftError, match=message):
+        write_library(
+            str(tmp_path / "late.yaml"),
+            tmp_path / "pd",
+            "controller",
+            outputs=taken,
+            delays="outside",
+        )
+
+
+@needs_compiler
 def test_wrong_calls_and_numbers_are_refused(written: Path) -> None:
     library = SharedLibrary(written)
     name = ctypes.CDLL(str(written.parent / "libpd.so"))
@@ -284,6 +367,60 @@ def test_what_a_block_asks_of_python_is_a_status_with_its_name(tmp_path: Path) -
         ("EVENT", "bounded", [9.0]),
         ("OK", "", [3.0]),
     ]
+
+
+FAILING = """\
+import math
+import numpy as np
+from aloft import Block, Input, Output, kernel
+from aloft.blocks.general.vectors import Vector, VectorParameters
+
+
+class Failing(Block):
+    "Fails in the way that a number says."
+
+    class Params(VectorParameters):
+        pass
+
+    params: Params
+    u = Input(Vector, text="the way")
+    y = Output(Vector, text="numbers")
+
+    @kernel
+    @staticmethod
+    def step(u: Vector, y: Vector) -> None:
+        way = int(u.value[0])
+        if way == 1:
+            y.value[0] = 1.0 / (u.value[0] - 1.0)
+        if way == 2:
+            y.value[0] = (way << 61) * way
+        if way == 3:
+            y.value[0] = math.sqrt(-u.value[0])
+        if way == 4:
+            y.value[0] = math.exp(1000.0 * u.value[0])
+        t = np.zeros(2)
+        y.value[0] = t @ np.ones(6)[way : way + 2]
+"""
+
+
+@needs_compiler
+def test_a_block_that_fails_says_why(tmp_path: Path) -> None:
+    (tmp_path / "failing_block.py").write_text(FAILING)
+    (tmp_path / "failing.yaml").write_text(
+        "rate: 100 Hz\nblocks:\n  given: {use: blocks.External}\n"
+        '  failing: {use: "failing_block:Failing", in: {u: given.y}}\n'
+    )
+    made = write_library(
+        str(tmp_path / "failing.yaml"), tmp_path / "failing", outputs=["failing.y"]
+    )
+    library = SharedLibrary(made.description)
+    found = []
+    for way in (0, 1, 2, 3, 4, 5):
+        library.reset()
+        library.inputs["given"][...] = way
+        found.append((Status(library.step()).name, library.last_block()))
+    names = ("DIVIDED_BY_ZERO", "TOO_LARGE", "OUT_OF_DOMAIN", "OUT_OF_RANGE", "WRONG_LENGTH")
+    assert found == [("OK", ""), *((name, "failing") for name in names)]
 
 
 def test_blocks_that_need_python_are_named_all_at_once(tmp_path: Path) -> None:

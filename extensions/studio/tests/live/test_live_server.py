@@ -61,6 +61,10 @@ def test_what_it_answers(server: LiveServer) -> None:
     assert status == 200
     (row,) = (row for row in found["parameters"] if row["path"] == "wave.frequency")
     assert row["value"] == 2.0
+    status, now = ask(server, "GET", "/now?chart=wave.y.value&chart=no.such.field")
+    assert status == 200 and [len(v) for v in now["charted"].values()] == [2]
+    status, about = ask(server, "GET", "/lines?field=wave.y.value")
+    assert (status, about["names"]) == (200, ["0", "1"])
     status, done = ask(server, "POST", "/set", {"settings": ["wave.frequency=0.005 kHz"]})
     assert status == 200 and done["changes"][0]["new"] == 5.0
     status, done = ask(server, "POST", "/save")
@@ -90,6 +94,8 @@ def refusing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LiveServer]:
         ("GET", "/now", None, {"X_Aloft_Token": None}, 403, "the token is missing or wrong"),
         ("GET", "/parameters", None, {"X_Aloft_Token": "é"}, 403, "the token is missing or wrong"),
         ("GET", "/set", None, {}, 404, "there is no /set"),
+        ("GET", "/now?" + "&".join(["chart=wave.y.value"] * 9), None, {}, 400, "at most 8 fields"),
+        ("GET", "/lines?field=wave.y.no", None, {}, 409, "no output field 'wave.y.no'"),
         ("GET", "/now", None, {"Host": "evil.example:80"}, 403, "for this machine only"),
         ("GET", "/now", None, {"Host": "127.0.0.1:1"}, 403, "for this machine only"),
         ("GET", "/now", None, {"Host": None}, 403, "for this machine only"),
@@ -233,6 +239,36 @@ def test_a_run_is_watched_and_tuned(server: LiveServer, running: Running, tmp_pa
         page.ask("document.getElementById('save').click()")
         page.wait("document.getElementById('saved').textContent", f"1 values are in {server.save}")
         assert checked_file(server.save).block("wave").params.frequency == 1.0  # type: ignore[attr-defined]
+        # folded by block, and names beside the numbers of a list
+        assert (
+            page.ask(
+                "[...document.querySelectorAll('.fold summary')].map(s => s.textContent.split(' ')[0]).join()"
+            )
+            == "wave,inner/twice,pid"
+        )
+        assert (
+            page.ask(
+                "[...document.querySelectorAll('[data-path=\"pid.kp\"] .element')].map(e => e.textContent).join()"
+            )
+            == "0,1"
+        )
+        # a strip chart of both elements grows, says its numbers, and goes away
+        page.ask(click("wave"))
+        page.ask(
+            "[...document.querySelectorAll('.charted button')].find(b => b.textContent === 'y.value').click()"
+        )
+        page.wait("document.querySelectorAll('.chart path').length", 2)
+        page.wait(
+            "[...document.querySelectorAll('.chart path')].every(p => p.getAttribute('d').split('L').length > 5)"
+        )
+        assert (
+            page.ask("document.querySelector('.chart figcaption b').textContent") == "wave.y.value"
+        )
+        assert page.ask(
+            "[...document.querySelectorAll('.legend output')].every(o => o.textContent !== '')"
+        )
+        page.ask("document.querySelector('.chart figcaption button').click()")
+        page.wait("document.getElementById('charts').hidden")
         # closing a sub-graph keeps the token
         page.ask("toggle('inner')")
         page.wait("location.search.includes('closed=inner')")

@@ -76,7 +76,7 @@ def test_what_the_socket_and_the_page_refuse(running: Running, server: LiveServe
     live = server.run
     wait_for(live, "paused")  # type: ignore[arg-type]
     with pytest.raises(
-        EndpointError, match="a run does not 'fly'; it can pause, go on, back and look"
+        EndpointError, match="a run does not 'fly'; it can pause, go on, back, play and look"
     ):
         live.control("fly")
     with pytest.raises(EndpointError, match="not a request: 'tick'"):
@@ -231,6 +231,10 @@ def test_a_run_in_real_time_is_paused_on_the_page(
             page.wait(STATE, "running")
             wait_until(lambda: run.bound.clock.tick > tick)
             page.wait("document.getElementById('paused').hidden")
+            page.ask(
+                "(r => { r.value = 50; r.dispatchEvent(new Event('change')); })(document.getElementById('rate'))"
+            )
+            wait_until(lambda: live.control("look")["percent"] == 50)
     finally:
         run.stop()
         live.close()
