@@ -243,8 +243,11 @@ class DamagedError(RecordingError):
     """Raised for a recording with bytes that are not what was written; names the lost ticks."""
 
 
-def scan(path: Path) -> Scan:
+def find_records(path: Path) -> tuple[Scan, bool]:
     """Look through a whole file, and verify every checksum; a block at a time is in memory.
+
+    Returns what is in it, and whether its records are not where they were written, or there are none: then another
+    program has written the file.
 
     Raises:
         OSError: it cannot be read.
@@ -255,16 +258,7 @@ def scan(path: Path) -> Scan:
         found, moved = _Scanner(path, file).scan()
     if head != MAGIC and not found.records:
         raise RecordingError(f"{path} is not a recording: it does not begin like a file of Rerun's")
-    if found.records and not moved:
-        return found
-    from .rewritten import read_again  # imports what only such files need
-
-    try:
-        return read_again(found)
-    except RecordingError:
-        if found.damage:
-            return found  # bytes are missing, or there are too many
-        raise
+    return found, moved or not found.records
 
 
 def expect_intact(found: Scan) -> None:

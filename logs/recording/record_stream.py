@@ -36,7 +36,7 @@ _PIPE_SIZE = 1 << 20
 
 
 class RerunPipe:
-    """What Rerun writes of a stream, as bytes.
+    """The bytes that Rerun writes of a stream.
 
     Args:
         stream: the stream, whose only sink this is.

@@ -11,8 +11,8 @@ from os import PathLike
 from pathlib import Path
 
 from ...runtime.language.errors import AloftError
-from ..file.reader import read
-from ..file.records import Content, Damage, scan
+from ..file.reader import read, scan
+from ..file.records import Content, Damage
 from .output_file import reserve_output
 from .writer import RecordingWriter
 

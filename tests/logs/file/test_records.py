@@ -13,7 +13,8 @@ from aloft.logs import RecordingError, read
 from aloft.logs.file import records
 from aloft.logs.file.format import FORMAT, Header
 from aloft.logs.file.header import header_of
-from aloft.logs.file.records import MARK, Content, Record, composed, packed_text, records_in, scan
+from aloft.logs.file.reader import scan
+from aloft.logs.file.records import MARK, Content, Record, composed, packed_text, records_in
 from aloft.logs.recording.output_file import reserve_output
 from aloft.logs.recording.record_stream import RecordStream, RerunPipe
 from aloft.logs.recording.writer import RecordingWriter
