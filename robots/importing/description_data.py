@@ -296,6 +296,9 @@ def rated_profile(
         for names, unit in ((turning, hinge), (slides, SLIDE_UNITS[hinge])):
             if names:
                 notes.append(f"no {what} limit of {listing(names, 6)}: {value:g} {unit} is assumed")
+    passive = [name for name, joint in joints.items() if not is_urdf and joint.effort == 0.0]
+    if passive:
+        notes.append(f"no actuator moves {listing(passive, 6)}")
     driven = [value for value in values.values() if value["peak_torque"] > 0] or [
         {**dict.fromkeys(KEYS, 0.0), "peak_torque": EFFORT, "continuous_torque": EFFORT,
          "corner_speed": CORNER * SPEED, "no_load_speed": SPEED}
