@@ -105,6 +105,10 @@ class Slices(Expressions):
             bounds = (
                 self._simple_cut(part, lower, upper, node, dimension) if step == 1 else None
             ) or self._general_cut(part, step, node, dimension)
+            if not (isinstance(bounds.first, ast.Constant) and bounds.first.value == 0):
+                bounds.length = called(
+                    "max", bounds.length, ast.Constant(0)
+                )  # one may begin beyond
             most = self._length_of(part, size)
             bounds.most = None if most is None else int(most)
         for each in ast.walk(bounds):
