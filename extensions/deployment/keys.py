@@ -273,7 +273,7 @@ def _session(placed: PlacedGraph, name: str, observers: Sequence[str]) -> dict[s
     ends = [spec.endpoint for spec in placed.machines]
     place = names.index(name) if name in names else len(names)
     nested: dict[str, Any] = {}
-    settings = session_settings(ends[place : place + 1], ends[:place])
+    settings = session_settings(ends[place : place + 1], ends[:place], placed.graph.links.lease)
     settings |= {
         "transport/link/tls": tls_settings(Path()),
         "access_control": party_access(placed, name, observers),

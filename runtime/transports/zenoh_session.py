@@ -14,18 +14,19 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..language.stages import LEASE
 from ..placement.placed import PlacedGraph
 from .transport import beacon_key, data_key, tick_key
 
-LEASE = 500
-"""Milliseconds of silence after which a peer is taken for lost."""
 ROOT = "aloft"
 """The first part of every key expression."""
 
 
-def session_settings(listen: Sequence[str], connect: Sequence[str]) -> dict[str, Any]:
+def session_settings(
+    listen: Sequence[str], connect: Sequence[str], lease: float = LEASE
+) -> dict[str, Any]:
     """Return the settings of a peer that listens and connects only at these endpoints, by their
-    paths in Zenoh's configuration."""
+    paths in Zenoh's configuration. After ``lease`` [s] without a word of it the others take it for lost."""
     return {
         "mode": "peer",
         "scouting/multicast/enabled": False,
@@ -40,19 +41,22 @@ def session_settings(listen: Sequence[str], connect: Sequence[str]) -> dict[str,
             "period_max_ms": 200,
             "period_increase_factor": 1.5,
         },
-        "transport/link/tx/lease": LEASE,
+        "transport/link/tx/lease": round(1e3 * lease),
         "transport/shared_memory/enabled": False,
     }
 
 
 def session_config(
-    listen: Sequence[str], connect: Sequence[str], secured: Mapping[str, Any] | None = None
+    listen: Sequence[str],
+    connect: Sequence[str],
+    secured: Mapping[str, Any] | None = None,
+    lease: float = LEASE,
 ) -> Any:
     """Return the session's settings as a Zenoh configuration; ``secured`` adds those of TLS and access."""
     import zenoh
 
     config = zenoh.Config()
-    for key, value in {**session_settings(listen, connect), **(secured or {})}.items():
+    for key, value in {**session_settings(listen, connect, lease), **(secured or {})}.items():
         config.insert_json5(key, json.dumps(value))
     return config
 

@@ -8,7 +8,7 @@ import pytest
 from aloft.logs import RecordingError, read
 from aloft.logs.file import packed_rows
 from aloft.logs.file.held_fields import split_bus
-from aloft.logs.file.messages import Content
+from aloft.logs.file.records import Content
 from aloft.logs.recording.recorder import RING_BYTES, Recorder
 from aloft.logs.recording.writer import write_recording
 from aloft.logs.replay.opened_run import OpenedRun
@@ -94,9 +94,9 @@ def test_where_a_held_row_is_lost_its_ticks_are(
 ) -> None:
     folder, result = made
     run = read(folder / "a.rrd")
-    message = run.scan.of(Content.HELD)[0]
+    record = run.scan.of(Content.HELD)[0]
     data = bytearray((folder / "a.rrd").read_bytes())
-    data[message.place + 400] ^= 1
+    data[record.place + 100] ^= 1
     (tmp_path / "a.rrd").write_bytes(data)
     with pytest.raises(
         RecordingError, match=r"of the ticks, those from the first tick to .* may be lost"

@@ -11,8 +11,8 @@ import pytest
 import zenoh
 
 from aloft.runtime.language.errors import AloftError
-from aloft.runtime.language.stages import MachineSpec
-from aloft.runtime.transports.zenoh_session import LEASE, as_chunk, session_config
+from aloft.runtime.language.stages import LEASE, MachineSpec
+from aloft.runtime.transports.zenoh_session import as_chunk, session_config
 from aloft.runtime.transports.zenoh_transport import ZenohTransport
 
 from ...waiting import free_port, wait_for
@@ -91,7 +91,9 @@ def test_the_configuration_searches_for_nobody() -> None:
     assert get("scouting/gossip/enabled") is False
     assert get("listen/endpoints") == ["tcp/127.0.0.1:7450"]
     assert get("connect/endpoints") == ["tcp/127.0.0.1:7451"]
-    assert get("transport/link/tx/lease") == LEASE
+    assert get("transport/link/tx/lease") == 1e3 * LEASE
+    short = session_config([], [], lease=0.25)
+    assert json.loads(short.get_json("transport/link/tx/lease")) == 250
     assert get("transport/shared_memory/enabled") is False
 
 
