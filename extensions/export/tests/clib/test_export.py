@@ -277,6 +277,8 @@ def test_delays_of_inputs_are_on_the_side_that_is_asked_for_and_said(
     for tick in range(len(place)):
         library.inputs["wish"][...], library.inputs["measured"][...] = wish[tick], late[tick]
         assert (library.step(), library.outputs["force"].tolist()) == (0, [force[tick]])
+    aloft.load(tmp_path / "late.yaml").run(sinks=[Recorder(tmp_path / "late.rrd")])
+    assert not check(made.description, tmp_path / "late.rrd").difference
 
 
 @pytest.mark.parametrize(
