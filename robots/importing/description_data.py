@@ -29,7 +29,7 @@ from ..robot_description import SLIDE_UNITS, Joint, Link, RobotDescription
 from ..validation import DescriptionError, RobotError, find_errors
 from ..validation.errors import nearest
 from ..validation.find_errors import shown
-from .build import BodyFrame, LinkTree, build, tidy
+from .build import BodyFrame, LinkTree, bolted, build, tidy
 from .looks import link_looks
 from .odd_bodies import odd_bodies
 from .raw_model import RawJoint, RawModel
@@ -440,6 +440,8 @@ def import_robot(path: Path, added: Mapping[str, Any], model: RawModel | None = 
     base_joint = added.get("base_joint", "")
     built = build(model, welded, base_joint if isinstance(base_joint, str) else "")
     notes += built.notes
+    if not base_joint:
+        notes += bolted(model, built.base_joint)
     unchanged = replace(
         built, links=[{**link} for link in built.links], joints=[{**each} for each in built.joints]
     )

@@ -148,10 +148,10 @@ def urdf_joints(file: XmlFile) -> dict[str, UrdfJoint]:
 
 def _range(joint: ElementTree.Element) -> str:
     """Return the ``range`` of a ``UrdfJoint``."""
-    limit = joint.find("limit")
-    if limit is None or joint.get("type") not in ("revolute", "prismatic"):
+    if joint.get("type") not in ("revolute", "prismatic"):
         return ""
-    given = [limit.get(key) for key in ("lower", "upper")]
+    limit = joint.find("limit")
+    given = [None if limit is None else limit.get(key) for key in ("lower", "upper")]
     if given == [None, None]:
         return "free"
     return "none" if [_value(text or "0") for text in given] == [0.0, 0.0] else ""

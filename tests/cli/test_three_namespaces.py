@@ -165,7 +165,7 @@ def test_a_pulled_cable_ends_in_damping_and_the_viewer_sees_it(
 def test_the_viewers_cable_hinders_nobody_and_one_that_is_put_back_is_heard_again(
     network: Network, here: Path
 ) -> None:
-    sets = free()
+    sets = free(lease="500 ms")
     network.part("onboard", "--no-record", *sets)
     network.part("ground", "--no-record", *sets)
     before = wait_until_it_runs(network, sets)["machines"]["onboard"]

@@ -200,6 +200,8 @@ class Links(LinkKeys):
     of: dict[str, LinkKeys] = _key("the links of single blocks, by block")
     paths: dict[str, Seconds] = _key("the largest age by path: robot.imu -> robot.command: 4 ms")
     watchdog: Seconds = _key("how long a link that brings commands may be silent: 15 ms")
+    lease: Seconds = _key("the silence after which a machine is taken for gone: 3 s")
+    patience: Seconds = _key("how long a part in lockstep waits for a message: 30 s")
 
 
 class GraphValues(_Keys):
