@@ -234,6 +234,49 @@ def test_a_thing_beside_the_robot_is_no_second_robot(tmp_path: Path) -> None:
     assert "left out: bodies beside the robot: ball" in found.notes
 
 
+def test_parts_whose_inertia_no_body_has_are_named(tmp_path: Path) -> None:
+    links = "".join(
+        LINK.format(name=name, mass=1, more="") for name in ("trunk", "thigh", "camera")
+    )
+    fixed = '<joint name="mount" type="fixed"><parent link="thigh"/><child link="camera"/></joint>'
+    hip = JOINT.format(name="hip", parent="trunk", child="thigh", more="")
+    text = f'<robot name="r">{links}{hip}{fixed}</robot>'
+    assert not any("none that a body has" in note for note in read_text(tmp_path, text).notes)
+    camera = text.index('name="camera"')
+    odd = text[:camera] + text[camera:].replace('ixx="0.002"', 'ixx="0.005"', 1)
+    assert (
+        "inertias of camera, which no joint moves, are none that a body has; they count as they are written"
+        in read_text(tmp_path, odd).notes
+    )
+
+
+def test_shapes_of_a_link_without_an_inertial_weigh_nothing_and_it_is_said(tmp_path: Path) -> None:
+    box = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
+    links = "".join(LINK.format(name=name, mass=1, more=box) for name in ("trunk", "thigh"))
+    fixed = '<joint name="mount" type="fixed"><parent link="thigh"/><child link="camera"/></joint>'
+    hip = JOINT.format(name="hip", parent="trunk", child="thigh", more="")
+    text = f'<robot name="r">{links}<link name="camera">{box}</link>{hip}{fixed}</robot>'
+    found = read_text(tmp_path, text)
+    assert found.description.total_mass == pytest.approx(2.0)
+    assert (
+        "links camera have shapes for collisions and no <inertial>: they weigh nothing here, and MuJoCo would weigh the shapes"
+        in found.notes
+    )
+
+
+def test_a_joint_with_one_limit_has_zero_as_the_other(tmp_path: Path) -> None:
+    links = "".join(LINK.format(name=name, mass=1, more="") for name in ("trunk", "thigh"))
+    hip = JOINT.format(name="hip", parent="trunk", child="thigh", more="")
+    hip = hip.replace('lower="-1" ', "")
+    text = f'<robot name="r">{links}{hip}</robot>'
+    found = read_text(tmp_path, text)
+    assert found.description.joints[0].limits == (0.0, 1.0)
+    assert (
+        "joint hip has one limit in the URDF; the other is zero, as in the format: 0 to 1"
+        in found.notes
+    )
+
+
 @pytest.mark.parametrize("declared", ["", '<link name="world"/>'])
 def test_a_robot_that_hangs_from_the_world_is_fixed_declared_or_not(
     declared: str, tmp_path: Path
