@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any, Self
 
 from ..language.errors import AloftError
-from ..language.stages import LEASE, MachineSpec
+from ..language.stages import MachineSpec
 from ..placement.placed import PlacedGraph
 from .tls import check_endpoints, secured
 from .transport import MessageCallback, NetworkTransport, free_ports
-from .zenoh_session import as_chunk, prefix_of, session_config
+from .zenoh_session import NO_LIMITS, Limits, as_chunk, prefix_of, session_config
 
 
 class ZenohTransport(NetworkTransport):
@@ -29,7 +29,7 @@ class ZenohTransport(NetworkTransport):
         machines: all machines of the graph, in its order.
         wait: whether sending waits where the queue is full. Lockstep waits, since nothing may be
             lost; a free-running part drops, since nothing may wait.
-        lease: the silence [s] after which others take this part for lost.
+        limits: lease, patience and the largest message.
         security: TLS and access control, as ``tls.secured`` gives them; none: neither.
     """
 
@@ -39,14 +39,14 @@ class ZenohTransport(NetworkTransport):
         machines: Sequence[MachineSpec],
         *,
         wait: bool = True,
-        lease: float = LEASE,
+        limits: Limits = NO_LIMITS,
         security: Mapping[str, Any] | None = None,
     ) -> None:
         self._prefix = prefix_of(graph)
         self._security = security
         self._machines = tuple(machines)
         self._wait = wait
-        self._lease = lease
+        self._limits = limits
         self._session: Any = None
         self._declared: list[Any] = []
         self._farewells: list[Callable[[], None]] = []
@@ -65,7 +65,7 @@ class ZenohTransport(NetworkTransport):
             placed.graph.name,
             placed.machines,
             wait=placed.graph.links.mode == "lockstep",
-            lease=placed.graph.links.lease,
+            limits=Limits.of(placed),
             security=None if keys is None else secured(placed, keys, name),
         )
 
@@ -86,7 +86,7 @@ class ZenohTransport(NetworkTransport):
 
         endpoints = [spec.endpoint for spec in self._machines]
         try:
-            self._session = zenoh.open(session_config([], endpoints, self._security, self._lease))
+            self._session = zenoh.open(session_config([], endpoints, self._security, self._limits))
         except zenoh.ZError as error:
             raise AloftError(f"no session of Zenoh could be opened: {error}") from error
 
@@ -103,7 +103,7 @@ class ZenohTransport(NetworkTransport):
                     [own],
                     [spec.endpoint for spec in self._machines[:place]],
                     self._security,
-                    self._lease,
+                    self._limits,
                 )
             )
         except zenoh.ZError as error:
