@@ -131,7 +131,7 @@ class FaultDetectorState(Signal):
     gross = Field(
         5,
         dtype="int64",
-        text="ticks in a row with a gross error of gyroscope axes (large ones count three times), gravity and push",
+        text="ticks in a row with a gross error of gyroscope axes, gravity and push",
     )
     rested = Field(dtype="int64", text="ticks of rest so far")
     stop = Field(dtype="int64", values=Stop, text="why the run was ended")
