@@ -146,7 +146,7 @@ def find_gross_push(
     constants: FaultDetectorConstants,
     scratch: FaultDetectorScratch,
 ) -> None:
-    """Count the ticks of squat and thrust in which the accelerometer reads less than a share of what the legs push.
+    """Count the ticks of squat, thrust, landing and recovery in which the accelerometer reads less than a share of what the legs push.
 
     Feet only push, and what they push by the legs' torques is what a mass on them feels. Judged is where
     they carry more than ``open_load``.
