@@ -66,7 +66,9 @@ def check(
             typer.echo(f"cost: {recording_cost(checked)}")
         count, machines = len(checked.blocks), len(checked.machines)
         spread = f" on {machines} machine{'s' if machines > 1 else ''}" if machines else ""
-        typer.echo(f"{graph}: no problems; {count} blocks at {checked.base_rate:g} Hz{spread}")
+        typer.echo(
+            f"{graph}: no problems; {count} block{'s' if count != 1 else ''} at {checked.base_rate:g} Hz{spread}"
+        )
 
 
 def check_users_blocks(graph: CheckedGraph) -> list[str]:

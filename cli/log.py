@@ -154,9 +154,9 @@ def compare(
 
 @log.command("repair")
 def repair(file: File, as_json: AsJson = False) -> None:
-    """Repair a recording in place: remove cut or damaged messages, and keep the rest."""
-    from ..logs.file.repair import repair as mend
+    """Repair a recording: write all that is intact of it into a new file of its name."""
     from ..logs.recording.output_file import finished_name, is_being_written
+    from ..logs.recording.repair import repair as mend
 
     with errors_reported(as_json):
         try:
@@ -174,8 +174,9 @@ def repair(file: File, as_json: AsJson = False) -> None:
     if as_json:
         found: dict[str, Any] = {
             "closed": done.closed,
-            "removed_bytes": done.removed,
-            "messages": done.messages,
+            "size_before": done.size_before,
+            "size": done.size,
+            "records": done.records,
         }
         found |= {"damage": [str(each) for each in done.damage], "file": str(file)}
         print_json({"success": True, **found, "ticks": len(ticks), "last_tick": last})
@@ -251,7 +252,7 @@ def summary(run: RecordedRun) -> dict[str, Any]:
     return {
         "graph": header.name,
         "whole": run.whole,
-        "checksums": run.scan.sealed,
+        "rewritten": run.scan.rewritten is not None,
         "damage": [str(each) for each in run.damage],
         "outcome": outcome["reason"] if outcome else None,
         "run_hash": outcome["run_hash"] if outcome else None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,11 +19,11 @@ _WORDS: Mapping[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
     "angular_velocity": (("angular_velocity", "gyro", "omega"), (3,)),
     "specific_force": (("linear_acceleration", "accel", "imuacc", "acc"), (3,)),
     "joint_position": (
-        ("joint_position", "jointspos", "joint_states.position", "position", "q"),
+        ("joint_position", "jointspos", "joint_states.position", "position", "pos", "q"),
         (),
     ),
     "joint_velocity": (
-        ("joint_velocity", "jointsvel", "joint_states.velocity", "velocity", "qd"),
+        ("joint_velocity", "jointsvel", "joint_states.velocity", "velocity", "vel", "qd", "dq"),
         (),
     ),
     "joint_torque": (("joint_torque", "effort", "torque", "tau"), ()),
@@ -31,6 +32,13 @@ _WORDS: Mapping[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
     "truth_quaternion": (("quaternion", "pose.orientation"), (4,)),
 }
 """Words in the names of columns, the likeliest first, and their widths; none: as many as there are joints."""
+_LIKELY = ("meas", "actual", "fbk", "feedback")
+_UNLIKELY = ("des", "ref", "cmd", "command", "target", "setpoint", "filt", "fric", "err", "con")
+"""Words of what was measured, and of what was wanted or computed: no sensor."""
+_NUMBERED = re.compile(r"(?P<stem>.*?)[_\[]?(?P<number>\d+)\]?(?P<rest>\D*)")
+
+Guess = str | list[str]
+"""A column, or the columns of one number each, in order."""
 
 
 def import_log(
@@ -53,7 +61,7 @@ def import_log(
         except LogError as error:
             raise AloftError(str(error)) from None
         widths = {name: each.values.shape[1] for name, each in found.arrays.items()}
-        guessed = guess(widths)
+        guessed = guess(widths, joints_of(robot))
         target = out or file.with_suffix(".yaml")
         if target.exists() and not force:
             raise AloftError(f"{target} exists; --force overwrites it, --out names another")
@@ -64,7 +72,11 @@ def import_log(
     if as_json:
         print_json({"graph": str(target), "columns": widths, "guessed": guessed})
         return
-    meaning = {column: what for what, column in guessed.items()}
+    meaning = {
+        column: what
+        for what, columns in guessed.items()
+        for column in (columns if isinstance(columns, list) else [columns])
+    }
     rows = [
         (name, str(len(each.values)), str(widths[name]), each.unit or "", meaning.get(name, ""))
         for name, each in found.arrays.items()
@@ -73,32 +85,90 @@ def import_log(
     say(console(), f"wrote {target}: look at each part, then `aloft check {target}`")
 
 
-def guess(widths: Mapping[str, int]) -> dict[str, str]:
-    """Return the column of each quantity, of those whose names have its words and whose width fits."""
-    guessed: dict[str, str] = {}
+def joints_of(robot: Path | None) -> int | None:
+    """Return how many joints a robot has; ``None`` without one. Raises ``AloftError``."""
+    if robot is None:
+        return None
+    from ..robots.description import find_robot
+
+    return len(find_robot(str(robot)).joints)
+
+
+def guess(widths: Mapping[str, int], joints: int | None = None) -> dict[str, Guess]:
+    """Guess the column of each quantity, by the words in its name and its width.
+
+    Columns of one number that differ by a number only (``pos_meas1``, ``pos_meas2``) are one quantity. What was measured
+    comes before what was wanted or computed.
+
+    Args:
+        widths: numbers of each column, by its name.
+        joints: how many joints the robot has; without it a quantity of joints has more than four
+            numbers, or is of numbered columns.
+
+    Returns:
+        The column, or the columns in order, by quantity.
+    """
+    series = numbered(widths)
+    known = {**widths, **{stem: len(columns) for stem, columns in series.items()}}
+    guessed: dict[str, Guess] = {}
     for what, (words, allowed) in _WORDS.items():
-        free = [name for name in widths if name not in guessed.values()]
-        column = _first(words, free, widths, allowed)
+        free = [name for name in known if name not in guessed.values()]
+        fitting = [
+            name
+            for name in sorted(free, key=_doubt)
+            if (known[name] in allowed if allowed else _of_joints(name, known, series, joints))
+        ]
+        column = _first(words, fitting)
         if column is not None:
             guessed[what] = column
-    return guessed
+    return {what: series.get(str(column), column) for what, column in guessed.items()}
 
 
-def _first(
-    words: Iterable[str], names: list[str], widths: Mapping[str, int], allowed: tuple[int, ...]
-) -> str | None:
+def numbered(widths: Mapping[str, int]) -> dict[str, list[str]]:
+    """Return the columns of one number that count up from 0 or 1, by what their names share."""
+    found: dict[str, dict[int, str]] = {}
+    for name, width in widths.items():
+        match = _NUMBERED.fullmatch(name)
+        if match is not None and width == 1 and match["stem"]:
+            found.setdefault(match["stem"] + match["rest"], {})[int(match["number"])] = name
+    return {
+        stem: [columns[k] for k in sorted(columns)]
+        for stem, columns in found.items()
+        if len(columns) > 1 and sorted(columns) == list(range(min(columns), min(columns) + len(columns)))
+        and min(columns) in (0, 1) and stem not in widths
+    }  # fmt: skip
+
+
+def _of_joints(
+    name: str, widths: Mapping[str, int], series: Mapping[str, list[str]], joints: int | None
+) -> bool:
+    """Tell whether a column may have a number for each joint."""
+    if joints is not None:
+        return widths[name] == joints
+    return widths[name] > 4 or name in series
+
+
+def _doubt(name: str) -> int:
+    """Return 0 for a column that says that it was measured, 2 for one that was wanted or computed, else 1."""
+    parts = re.split(r"[^a-z]+", name.lower())
+    if any(word in name.lower() for word in _LIKELY):
+        return 0
+    return 2 if any(word in parts for word in _UNLIKELY) else 1
+
+
+def _first(words: Iterable[str], names: list[str]) -> str | None:
     for word in words:
         for name in names:
-            fits = widths[name] in allowed if allowed else widths[name] > 4
-            if fits and (word in name.lower() if len(word) > 2 else word == name.lower()):
+            if word in name.lower() if len(word) > 2 else word == name.lower():
                 return name
     return None
 
 
 def graph_of(
-    file: Path, robot: Path | None, guessed: Mapping[str, str], own_stamps: bool
+    file: Path, robot: Path | None, guessed: Mapping[str, Guess], own_stamps: bool
 ) -> dict[str, Any]:
-    """Return a graph that plays what was guessed, estimates the base, and scores where there is a truth."""
+    """Return a graph that plays what was guessed, estimates the base where there is an IMU, and scores that
+    where there is a truth."""
     played: dict[str, Any] = {"file": file.name}
     if "time" in guessed and not own_stamps:
         played["clock"] = {"stamps": guessed["time"]}
@@ -116,15 +186,16 @@ def graph_of(
     if "truth_position" in guessed and turn is not None:
         played["truth"] = {"position": guessed["truth_position"], turn: guessed[f"truth_{turn}"]}
     blocks: dict[str, Any] = {"robot": {"use": "hal.LogRobot", "with": played}}
-    blocks["estimator"] = {
-        "use": "blocks.StateEstimator",
-        "in": {
-            "imu": "robot.imu",
-            "joints": "robot.joints",
-            "contacts": {"active": "robot.contacts.closed"},
-        },
-    }
-    if "truth" in played:
+    if "imu" in played:
+        blocks["estimator"] = {
+            "use": "blocks.StateEstimator",
+            "in": {
+                "imu": "robot.imu",
+                "joints": "robot.joints",
+                "contacts": {"active": "robot.contacts.closed"},
+            },
+        }
+    if "truth" in played and "estimator" in blocks:
         blocks["score"] = {
             "use": "blocks.EstimatorScore",
             "with": {"align": "start"},

@@ -243,7 +243,7 @@ def search_nearest(
 
 
 def solver_with_progress(tell: Any) -> Any:
-    """Return the planner, which prints what it is compiling."""
+    """Return the planner, which prints what it is deriving."""
     from ..planner.solving.solve import solve_jump
 
     def make(

@@ -79,7 +79,9 @@ def panels_of(run: RecordedRun, name: str, start: float | None, end: float | Non
     kept &= run.time >= start if start is not None else True
     kept &= run.time <= end if end is not None else True
     if not kept.any():
-        raise AloftError(f"nothing was recorded between {start} s and {end} s")
+        from ..runtime.running.plots import nothing_between
+
+        raise AloftError(nothing_between(start, end))
     named = run.header.robot.element_names if run.header.robot else {}
     panels = []
     for each in found:

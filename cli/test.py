@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..runtime.language.errors import AloftError, ExitCode
+from ..runtime.language.errors import AloftError, ExitCode, UnknownBlockError
 from .shared.options import AsJson, Trust
 from .shared.output import console, errors_reported, print_json, print_warning, say, table
 
@@ -115,7 +115,6 @@ def sort_targets(targets: list[str]) -> tuple[list[Target], list[str]]:
         LoadError: a graph may not run.
         AloftError: a target is nothing that can be tested.
     """
-    from ..runtime.language.registry import find_block
     from ..runtime.loading import checked_file
     from ..runtime.loading.checking.parameters import plain_parameters
 
@@ -140,8 +139,35 @@ def sort_targets(targets: list[str]) -> tuple[list[Target], list[str]]:
         elif path.exists():
             paths.append(target)
         else:
-            blocks.append(Target(target, find_block(target, Path.cwd())))
+            blocks += _blocks_named(target)
     return blocks, paths
+
+
+def _blocks_named(target: str) -> list[Target]:
+    """Return the block of that name, or all that a module defines.
+
+    Raises:
+        AloftError: there is neither, or the module cannot be imported.
+    """
+    from ..runtime.language.block import Block
+    from ..runtime.language.importing import find_source, user_module
+    from ..runtime.language.registry import find_block
+
+    here = Path.cwd()
+    try:
+        return [Target(target, find_block(target, here))]
+    except UnknownBlockError:
+        if ":" in target or find_source(target, [here]) is None:
+            raise
+    module = user_module(target, [here])
+    own = [
+        each
+        for each in vars(module).values()
+        if isinstance(each, type) and issubclass(each, Block) and each.__module__ == module.__name__
+    ]
+    if not own:
+        raise AloftError(f"the module {target} defines no block")
+    return [Target(f"{target}:{each.__name__}", each) for each in own]
 
 
 def check(target: Target, robot: str) -> list[Row]:
@@ -149,8 +175,16 @@ def check(target: Target, robot: str) -> list[Row]:
 
     A ``robot`` that is named takes the place of the target's own.
     """
-    from ..runtime.testing.conformance import ConformanceError, check_block, conformance_cases
+    from ..runtime.testing.conformance import (
+        ConformanceError,
+        check_block,
+        conformance_cases,
+        missing_examples,
+    )
 
+    lacks = missing_examples(target.block_type) if target.params is None else ""
+    if lacks:
+        return [(target.name, "example_parameters", lacks)]
     rows = []
     for case in conformance_cases():
         problem = ""

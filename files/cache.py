@@ -80,11 +80,6 @@ class Cache:
             return None
         return unsealed(f"{self.kind}/{name}", content)
 
-    def loadable(self, name: str) -> Path | None:
-        """Return the file of a library that is kept under ``name`` and may be loaded, for loaders that take
-        paths; ``None`` as for ``load``. The digest stands behind the library's own end."""
-        return None if self.load(name) is None else self.path(name)
-
     def holds(self, name: str) -> bool:
         """Return whether there is a file for ``name``, without reading it."""
         path = self.path(name)

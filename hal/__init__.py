@@ -1,1 +1,18 @@
-"""Everything that touches the world: the robot interface, the simulator, drivers, their twins."""
+"""Everything that touches the world: the robot interface, the simulator, drivers, their twins.
+
+Its blocks are also found here, and imported when they are first asked for: ``from aloft.hal import MujocoRobot``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..runtime.language.block import Block
+
+
+def __getattr__(name: str) -> type[Block]:
+    """Return the block of that name, ``hal.NAME`` in a graph. Raises ``AttributeError``."""
+    from ..runtime.language.registry import attribute_of
+
+    return attribute_of(__name__, name)

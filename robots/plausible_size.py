@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from ..files.problems import listing
 from ..mathematics.arrays import Array
 from .kinematics import link_poses_in_base
 from .robot_description import RobotDescription
@@ -17,6 +18,9 @@ from .robot_description import RobotDescription
 LEAST, MOST = 0.1, 8000.0
 """kg/m^3; a robot outside is thinner than a tenth of the air around it, or as dense as steel. Those of ``example-robot-data``
 have 0.7 (a humanoid with large inertias) to 54 kg/m^3, but a pendulum whose masses have no size."""
+
+DENSEST = 22_600.0
+"""kg/m^3, osmium's."""
 
 
 def ball_density(robot: RobotDescription) -> tuple[float, float]:
@@ -53,7 +57,7 @@ def wrong_size(robot: RobotDescription) -> tuple[str, ...]:
     """Return what is wrong with size and mass together, in one sentence; none where nothing seems to be."""
     reach, density = ball_density(robot)
     if LEAST <= density <= MOST:
-        return ()
+        return too_dense(robot)
     unit = (
         "lengths in millimetres, or inertias in kg mm^2?"
         if density < LEAST
@@ -62,5 +66,28 @@ def wrong_size(robot: RobotDescription) -> tuple[str, ...]:
     said = (
         f"{robot.total_mass:.3g} kg in a ball of {reach:.3g} m radius are {density:.2g} kg/m^3, and robots have "
         f"{LEAST:g} to {MOST:g}: {unit}"
+    )
+    return (said, *too_dense(robot))
+
+
+def too_dense(robot: RobotDescription) -> tuple[str, ...]:
+    """Return a sentence on links whose mass is more than their inertia allows; none where there are none.
+
+    Of all bodies of a mass and a largest density a solid ball of that density has the least sum of principal moments, so a
+    body is somewhere as dense as the solid ball of its mass and its sum of moments.
+    """
+    found = []
+    for link in robot.links:
+        moments = sum(link.inertia[:3])
+        if link.mass > 0.0 and moments > 0.0:
+            radius = math.sqrt(5.0 / 6.0 * moments / link.mass)
+            density = link.mass / (4.0 / 3.0 * math.pi * radius**3)
+            if density > DENSEST:
+                found.append(f"{link.name} ({link.mass:.3g} kg, {density:.1g} kg/m^3)")
+    if not found:
+        return ()
+    said = (
+        f"the inertia of {listing(found, 4)} is that of a body denser than any material, {DENSEST:g} kg/m^3: a mass in grams, or "
+        "inertia in other units?"
     )
     return (said,)

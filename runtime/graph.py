@@ -22,6 +22,7 @@ from .language.signal_error import FOLDER
 from .language.stages import CheckedGraph, ClockSpec
 from .links.path_ages import path_sinks
 from .loading import checked_again, checked_file, checked_text
+from .loading.checking.parameters import adjust
 from .running.executor import Executor
 from .running.real_time import NO_REAL_TIME, RealTimeOptions
 from .running.run_result import RunResult
@@ -111,9 +112,8 @@ class Graph:
         Raises:
             RunError: a block could not be set up or started.
         """
-        return SteppedRun(
-            self.with_seed(seed).checked if seed is not None else self.checked, plain=plain
-        )
+        checked = self.with_seed(seed).checked if seed is not None else self.checked
+        return SteppedRun(checked, plain=plain, adjust=adjust)
 
     def with_seed(self, seed: int) -> Graph:
         """Return the same graph with this value for every parameter called ``seed``."""

@@ -54,7 +54,7 @@ def check_up(robot: RobotDescription) -> dict[str, Any]:
     """Compute the figures of a robot and the remarks about it, as plain data in SI units."""
     standing = standing_rows(robot)
     remarks = [
-        *_size(robot), *_links(robot), *_joints(robot), *_axes(robot), *_limits(robot), *_stance(robot), *_sides(robot),
+        *_size(robot), *_links(robot), *_inertias(robot), *_joints(robot), *_axes(robot), *_limits(robot), *_stance(robot), *_sides(robot),
         *_motors(robot, standing),
     ]  # fmt: skip
     return {
@@ -63,6 +63,10 @@ def check_up(robot: RobotDescription) -> dict[str, Any]:
         "motors": standing,
         "remarks": [vars(remark) for remark in remarks],
     }
+
+
+FROM_JOINT = 0.05
+"""A centre of mass so far from its joint [m] tells how far its link reaches."""
 
 
 def _size(robot: RobotDescription) -> Iterator[Remark]:
@@ -104,6 +108,32 @@ def _links(robot: RobotDescription) -> Iterator[Remark]:
         if not SLENDER * reach <= gyration <= WIDE * reach:
             yield Remark(f"link {link.name}", f"radius of gyration {gyration:.3g} m",
                          f"{SLENDER * reach:.2g} to {WIDE * reach:.2g} m for its shapes")  # fmt: skip
+
+
+def _inertias(robot: RobotDescription) -> Iterator[Remark]:
+    """Find inertias that are too large for a link without shapes, as one about the joint in place of the centre of mass is.
+
+    A body between its joint and a place R along its centre of mass, c away, has a radius of gyration of at most sqrt(c (R - c)).
+    """
+    ends = {joint.parent: np.array(joint.origin) for joint in robot.joints}
+    for joint in robot.joints:
+        link = robot.link(joint.child)
+        away = float(np.linalg.norm(link.com))
+        if link.shapes or away < FROM_JOINT or link.mass <= 0.0:
+            continue
+        along = np.array(link.com) / away
+        end = float(ends.get(link.name, np.zeros(3)) @ along)
+        most = math.sqrt(away * (max(2.0 * away, end) - away))
+        xx, yy, zz, xy, xz, yz = link.inertia
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        across = np.linalg.svd(along[None])[2][1:]
+        gyration = math.sqrt(
+            max(0.0, np.linalg.eigvalsh(across @ tensor @ across.T)[0]) / link.mass
+        )
+        if gyration > most:
+            about = "about the joint" if gyration**2 - away**2 <= most**2 else "in other units"
+            yield Remark(f"link {link.name}", f"radius of gyration {gyration:.3g} m about its centre of mass, which is "
+                         f"{away:.3g} m from its joint", f"at most {most:.3g} m: is its inertia {about}?")  # fmt: skip
 
 
 def _extent(link: Link) -> tuple[float, Array]:

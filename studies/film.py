@@ -100,13 +100,15 @@ class Take:
         camera: how it is taken.
 
     Raises:
-        AloftError: nothing in the recording says where a robot is.
+        AloftError: nothing in the recording says where a robot is, or it holds no tick.
     """
 
     def __init__(self, run: RecordedRun, caption: str, camera: Camera) -> None:
         ports, robot = scene_ports(run.header), run.header.robot
         if ports is None or robot is None:
             raise AloftError(f"{run.path} has no robot: nothing in it says where one is")
+        if not len(run.time):
+            raise AloftError(f"{run.path} holds no tick; there is nothing to draw")
         self.caption = caption
         self.robot = robot
         self.terrain = run.header.terrain or flat()

@@ -53,7 +53,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "runtime/links", "robots",
     ),
     "blocks/signals": ("runtime/language", "planner/task/phase"),
-    "blocks": (),
+    "blocks": ("runtime/language",),  # finds one of its blocks by name
     "planner": (),
     "planner/task": ("files", "mathematics", "robots", "runtime/language", "runtime/loading"),
     "planner/models": ("planner/task", "mathematics", "robots"),

@@ -35,9 +35,11 @@ from .fault_detector_state import (
 )
 from .gross_errors import (
     find_gross_gravity,
+    find_gross_push,
     find_gross_rate,
     gravity_looks_like,
     looks_like,
+    push_looks_like,
     vector_text,
 )
 from .leg_forces import force_along, solve_leg
@@ -76,14 +78,19 @@ class FaultDetector(Block):
       for ``open_time``. One foot across an edge may stand so, and does not count.
 
     It only warns, for a robot often survives what is found, and damping would make it fall. **Before lift-off** it ends the run, which puts the
-    robot in damping, where a driver's unit or sign is wrong, or a sensor gives nonsense: with such an IMU a robot falls within 0.2 s.
+    robot in damping, where a driver's unit or sign is wrong, or a sensor gives nonsense: with such an IMU a robot falls within 0.2 s. In squat
+    and thrust any suspect but an encoder ends it, too (``suspects_end``): a robot that still stands need not jump.
 
     * An axis of the gyroscope differs by more than ``gross_rate`` from the base's rate over its feet; in the thrust, where rates change by
       350 rad/s in a second and either may be late, by five times as much.
+    * A reading of the gyroscope beyond ``largest_rate``, which is beyond the range of any, ends the run at once, in every phase: in degrees per second
+      a thrust's 2.7 rad/s are 155, and within 4 ms the base would turn three times as fast.
     * In the stand, while joints are slow, the accelerometer differs by more than ``gross_gravity`` from 1 g away from the plane of the points that
       carry the robot. Neither the estimated attitude nor the switches are in it; the slope of the ground is, so it is a coarse check.
+    * In squat and thrust, while points stand and the legs' torques carry more than ``open_load``, the accelerometer reads less than ``gross_push`` of
+      what they push, along the same normal. In healthy runs it read 0.56 to 1.5 times as much.
 
-    The first must last for ``lateness`` and ``gross_time``, the second for ``gross_time``. The sign of the accelerometer's x and y cannot be seen in an upright stand: turn the robot by hand
+    The second must last for ``gross_time``, the others for ``lateness`` more. The sign of the accelerometer's x and y cannot be seen in an upright stand: turn the robot by hand
     (``aloft bring-up`` asks for it).
 
     The first suspect is kept in the state, in
@@ -159,8 +166,16 @@ class FaultDetector(Block):
         on_the_ground = phase.phase >= Phase.STAND and phase.phase <= Phase.THRUST
         if state.stop == Stop.NONE:
             most = params.gross_rate * (_FAST if phase.phase == Phase.THRUST else 1.0)
-            find_gross_rate(on_the_ground and rigid, most, imu, state, constants, scratch)
+            judged = on_the_ground and rigid
+            find_gross_rate(judged, most, params.largest_rate, imu, state, constants, scratch)
             find_gross_gravity(imu, joints, terms, phase, state, params, constants, scratch)
+            jumps = phase.phase == Phase.SQUAT or phase.phase == Phase.THRUST
+            find_gross_push(
+                jumps and rigid, imu, load, terms, phase, state, params, constants, scratch
+            )
+            suspected = state.suspect != Suspect.NONE and state.suspect != Suspect.ENCODER
+            if state.stop == Stop.NONE and jumps and suspected and params.suspects_end:
+                state.stop = Stop.SUSPECT
         state.standing = state.standing + 1 if rigid else 0
         stands = state.standing > constants.settling
         compare_gyroscope(stands, imu, state, params, constants, scratch, period)
@@ -216,11 +231,24 @@ class FaultDetector(Block):
         read, right = state.reading.copy(), state.right.copy()
         if state.stop == Stop.GYROSCOPE:
             axis = int(np.argmax(np.abs(read - right)))
+            if not np.abs(read).max() <= p.largest_rate or not np.isfinite(read).all():
+                axis = int(np.argmax(np.abs(read)))
+                return (
+                    f"the gyroscope's axis {'xyz'[axis]} reads {read[axis]:+.2f} rad/s, beyond the range of any; is it in degrees per "
+                    f"second? Correct the driver (largest_rate is {p.largest_rate:g} rad/s)"
+                )
             return (
                 f"the gyroscope's axis {'xyz'[axis]} reads {read[axis]:+.2f} rad/s while the base turns over its feet by "
                 f"{right[axis]:+.2f}{looks_like(read[axis], right[axis])}; correct the driver or the IMU's mounting "
                 f"(gross_rate is {p.gross_rate:g} rad/s)"
             )
+        if state.stop == Stop.PUSH:
+            return (
+                f"the accelerometer reads {vector_text(read)} m/s^2 while the legs push {vector_text(right)}"
+                f"{push_looks_like(read, right)}; correct the driver or the IMU's mounting (gross_push is {p.gross_push:g})"
+            )
+        if state.stop == Stop.SUSPECT:
+            return f"no jump with what is suspected: {self._reason()} (suspects_end)"
         return (
             f"the accelerometer reads {vector_text(read)} m/s^2 at rest, where the legs say {vector_text(right)}"
             f"{gravity_looks_like(read, right)}; correct the driver or the IMU's mounting (gross_gravity is {p.gross_gravity:g} g)"

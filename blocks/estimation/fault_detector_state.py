@@ -32,6 +32,10 @@ class Stop(IntEnum):
     """An axis of the gyroscope reads otherwise than the base turns over its feet."""
     GRAVITY = 2
     """At rest the accelerometer does not read gravity, away from the feet."""
+    PUSH = 3
+    """In squat or thrust the accelerometer does not read what the legs push."""
+    SUSPECT = 4
+    """A suspect was found, and the robot was about to jump."""
 
 
 class FaultDetectorParams(Parameters):
@@ -83,11 +87,23 @@ class FaultDetectorParams(Parameters):
         0.3, ge=0.0,
         text="difference of the accelerometer at rest from gravity over the legs, in g, that does; zero: none",
     )  # fmt: skip
+    largest_rate: float = parameter(
+        40.0, unit="rad/s", ge=0.0,
+        text="reading of the gyroscope, beyond the range of any, that ends a run at once; zero: none",
+    )  # fmt: skip
+    gross_push: float = parameter(
+        0.3, ge=0.0, lt=1.0,
+        text="share of what the legs push that the accelerometer must read in squat and thrust, or the run ends; zero: any",
+    )  # fmt: skip
+    suspects_end: bool = parameter(
+        True,
+        text="whether a suspect other than an encoder ends the run in squat and thrust",
+    )
     gross_time: float = parameter(
         0.004,
         unit="s",
         ge=0.0,
-        text="for how long gravity is off, and for how much longer than `lateness` a rate is",
+        text="for how long gravity is off, and for how much longer than `lateness` a rate or a push is",
     )
 
 
@@ -113,7 +129,9 @@ class FaultDetectorState(Signal):
     lacking = Field(3, unit="N", frame="body", text="mean force that the legs lack")
     open = Field(dtype="int64", text="ticks in a row with load and no switch closed")
     gross = Field(
-        4, dtype="int64", text="ticks in a row with a gross error of gyroscope axes and gravity"
+        5,
+        dtype="int64",
+        text="ticks in a row with a gross error of gyroscope axes (large ones count three times), gravity and push",
     )
     rested = Field(dtype="int64", text="ticks of rest so far")
     stop = Field(dtype="int64", values=Stop, text="why the run was ended")

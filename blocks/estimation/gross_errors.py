@@ -9,7 +9,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
-from ..signals import DynamicsTerms, ImuReading, JointState, Phase, PhaseState
+from ..signals import DynamicsTerms, FootLoad, ImuReading, JointState, Phase, PhaseState
 from .fault_detector_state import (
     FaultDetectorConstants,
     FaultDetectorParams,
@@ -57,6 +57,16 @@ def gravity_looks_like(read: Array, right: Array) -> str:
     return f": {' or '.join(found)} looks wrong" if best < 0.3 * GRAVITY else ""
 
 
+def push_looks_like(read: Array, right: Array) -> str:
+    """Say which error of a driver a reading in squat or thrust looks like."""
+    along = float(read @ right / (right @ right))
+    if -2.0 < along < -0.5:
+        return ": its sign looks wrong"
+    if 0.5 / GRAVITY < along < 2.0 / GRAVITY:
+        return ": it looks like g in place of m/s^2"
+    return ""
+
+
 def vector_text(values: Array) -> str:
     return f"({', '.join(f'{value:+.2f}' for value in values)})"
 
@@ -68,17 +78,24 @@ def vector_text(values: Array) -> str:
 def find_gross_rate(
     judged: bool,
     most: float,
+    largest: float,
     imu: ImuReading,
     state: FaultDetectorState,
     constants: FaultDetectorConstants,
     scratch: FaultDetectorScratch,
 ) -> None:
     """Count the ticks in which an axis of the gyroscope reads by more than ``most`` [rad/s] otherwise than the base turns
-    over its feet."""
+    over its feet; those with three times as much count three times. A rate beyond the ``largest`` [rad/s] that
+    any gyroscope reads ends the run at once, in every phase."""
     for axis in range(3):
         off = abs(imu.angular_velocity[axis] - scratch.turning[1, axis])
         gross = judged and most > 0.0 and not off <= most
-        state.gross[axis] = state.gross[axis] + 1 if gross else 0
+        heavy = (
+            3 if off > 3.0 * most else 1
+        )  # with so large an error nothing waits: the robot tips over in 40 ms
+        state.gross[axis] = state.gross[axis] + heavy if gross else 0
+        if largest > 0.0 and not abs(imu.angular_velocity[axis]) <= largest:
+            state.gross[axis] = constants.gross_ticks[0] + 1
         if state.gross[axis] > constants.gross_ticks[0]:
             state.stop = Stop.GYROSCOPE
             state.reading[:] = imu.angular_velocity
@@ -118,6 +135,39 @@ def find_gross_gravity(
         state.stop = Stop.GRAVITY
         state.reading[:] = imu.specific_force
         state.right[:] = GRAVITY * scratch.up
+
+
+@kernel
+def find_gross_push(
+    judged: bool,
+    imu: ImuReading,
+    load: FootLoad,
+    terms: DynamicsTerms,
+    phase: PhaseState,
+    state: FaultDetectorState,
+    params: FaultDetectorParams,
+    constants: FaultDetectorConstants,
+    scratch: FaultDetectorScratch,
+) -> None:
+    """Count the ticks of squat and thrust in which the accelerometer reads less than a share of what the legs push.
+
+    Feet only push, and what they push by the legs' torques is what a mass on them feels. Judged is where
+    they carry more than ``open_load``.
+    """
+    pushed = 0.0
+    for foot in range(load.force.shape[0]):
+        pushed += load.force[foot] / constants.weight
+    gross, read = False, 0.0
+    heavy = judged and params.gross_push > 0.0 and pushed > params.open_load
+    if heavy and away_from_feet(terms, phase, scratch):
+        for axis in range(3):
+            read += imu.specific_force[axis] * scratch.up[axis]
+        gross = not read > params.gross_push * GRAVITY * pushed
+    state.gross[4] = state.gross[4] + 1 if gross else 0
+    if state.gross[4] > constants.gross_ticks[0]:
+        state.stop = Stop.PUSH
+        state.reading[:] = imu.specific_force
+        state.right[:] = GRAVITY * pushed * scratch.up
 
 
 @kernel

@@ -171,6 +171,10 @@ class SineWave(UnitFromParameters, Block):
                 raise ValueError("expected frequencies of zero or more")
             return value
 
+        def live_range(self, name: str) -> tuple[float | None, float | None]:
+            """Return the bounds of a parameter, from which a page makes a slider."""
+            return (0.0, None) if name == "frequency" else (None, None)
+
     params: Params
     y = Output(Vector, text="the sine")
 

@@ -92,6 +92,7 @@ class TablePlayback(UnitFromParameters, Block):
     def setup(self) -> None:
         table = read_table(self.params, self.context.folder)
         times, rounding = table.times, 0.0
+        self._first = 0.0 if self.params.from_first else float(times[0])
         if self.params.from_first:
             rounding = 4.0 * float(np.spacing(np.abs(times).max()))
             times = times - times[0]
@@ -104,6 +105,18 @@ class TablePlayback(UnitFromParameters, Block):
             four = self.rows[:, start : start + 4]
             four /= np.sqrt(np.sum(four * four, axis=1))[:, None]
             four *= _sides(four)[:, None]
+
+    def warnings(self) -> Sequence[str]:
+        """Warn at the end of a run that nothing but the first row was played."""
+        time = self.tick * self.context.clock.base_period
+        if not 0.0 < time < self._first:
+            return ()
+        return (
+            (
+                f"the first time of the table is {self._first:.12g} s, and the run ended after {time:.9g} s: only its "
+                "first row was played; for times of day: from_first: true"
+            ),
+        )
 
     @kernel
     @staticmethod

@@ -120,11 +120,13 @@ def errors_reported(as_json: bool, *, traceback: bool = False) -> Iterator[None]
         raise typer.Exit(ExitCode.BAD_INPUT) from error
     except AloftError as error:
         code = error.exit_code if isinstance(error, RunError) else ExitCode.BAD_INPUT
+        where = getattr(error, "where", "")  # of a module that cannot be imported
         if as_json:
             details = error.to_json() if isinstance(error, RunError) else {}
+            details |= {"where": str(where)} if where else {}
             print_json({"success": False, "reason": str(error), **details})
         else:
-            print_error(str(error))
+            print_error(f"{where}: {error}" if where else str(error))
             if traceback and isinstance(error, RunError):
                 print_location(error, traceback=True)
         raise typer.Exit(code) from error

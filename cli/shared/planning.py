@@ -275,7 +275,7 @@ def plan_grid(
     rows: list[GridRow] = []
     with stopped_by_signals() as received:
         if missing and not cluster:
-            compile_once(library, missing, screen)
+            derive_once(library, missing, screen)
         with (
             progress_bar(screen, f"planning {len(tasks)} jumps", len(tasks)) as (bar, bar_task),
             closing(
@@ -314,15 +314,15 @@ def plan_grid(
     return code
 
 
-def compile_once(library: PlanLibrary, tasks: list[JumpTask], screen: Console) -> None:
-    """Compile before the workers start; otherwise each of them would compile the same functions."""
+def derive_once(library: PlanLibrary, tasks: list[JumpTask], screen: Console) -> None:
+    """Derive functions before the workers start; otherwise each of them would derive the same ones."""
     from ...planner.solving.solve import make_problem
     from ...planner.task.files import PlanError
     from ...planner.task.task import JumpTaskError
 
     # In the plane and out of it there are other functions, and for every formulation.
     kinds = {(t.formulation, bool(t.distance_y or t.twist), t.impact): t for t in tasks}
-    with screen.status("compiling the model, once") as status:
+    with screen.status("deriving the robot's functions, once") as status:
 
         def progress(text: str, done: int, total: int) -> None:
             status.update(f"{text} ({done} of {total})")

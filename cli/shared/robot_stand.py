@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ...runtime.language.errors import AloftError
 from .options import JsonBesideTables, Quiet, expand_option_groups
 from .output import console, errors_reported, say
 from .robot_trials import (
@@ -46,8 +47,11 @@ def stand(
     recording: RecordOptions,
     as_json: JsonBesideTables = False,
     quiet: Quiet = False,
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="The robot, as after --robot.", show_default=False)
+    ] = "",
 ) -> None:
-    """Let a robot stand in its trial, or squat: aloft robot stand --robot go1.urdf --squat 6cm."""
+    """Let a robot stand in its trial, or squat: aloft robot stand go1.urdf --squat 6cm."""
     from ...runtime.graph import load
     from ...runtime.loading.reading.files import PREFIX, shipped_graphs
     from ...studies.batch.seeds import overrides_for, parse_seeds
@@ -55,11 +59,12 @@ def stand(
     out = console(to_stderr=as_json, quiet=quiet)
     with errors_reported(as_json):
         require_one_or_many(running, recording)
+        robot = named_once(name, running.robot)
         depth = quantity("squat", asked.squat, "m", "6cm") if asked.squat else 0.0
         speed = quantity("push", asked.push, "m/s", "0.1m/s") if asked.push else 0.0
         path = running.graph or shipped_graphs()[f"{PREFIX}robots/stand"]
-        own = [] if running.graph else [robot_setting(running.robot)]
-        about = about_robot(running.robot, "stand", out) if own else {}
+        own = [] if running.graph else [robot_setting(robot)]
+        about = about_robot(robot, "stand", out) if own else {}
         settings = [
             *own, *trial_settings_of(running),
             f"plan.squat_depth={depth!r}", f"push.speed_change={speed!r}", *(running.overrides or []),
@@ -78,3 +83,11 @@ def stand(
             also = {"asked": {"squat_depth": depth, "push_speed": speed}, **about}
             code = run_once(loaded, options, out, also=also)
     raise typer.Exit(code)
+
+
+def named_once(name: str, option: str) -> str:
+    """Return the robot of the argument or, without one, of the option. Raises ``AloftError`` for two."""
+    default = TrialOptions.__dataclass_fields__["robot"].default
+    if name and option not in (default, name):
+        raise AloftError(f"two robots: {name} and --robot {option}; name one")
+    return name or option

@@ -27,7 +27,7 @@ def draw(recording: Path, layout: Path | None, path: Path) -> Path:
     What is no recording of a run, such as the motion of a plan or a comparison that was kept, is
     shown as it is.
     """
-    from ...logs.file.messages import NoRunError
+    from ...logs.file.records import NoRunError
     from ...logs.recording.drawn_run import write_view
     from ...logs.viewing.blueprint import blueprint_with, layout_beside, read_layout
     from ...robots.surfaces import missing_meshes

@@ -33,7 +33,7 @@ from ...runtime.transports.tls import (
     party_access,
     tls_settings,
 )
-from ...runtime.transports.zenoh_session import session_settings
+from ...runtime.transports.zenoh_session import Limits, session_settings
 
 AUTHORITY_KEY = "authority-key.pem"
 _EARLIER = timedelta(minutes=10)
@@ -273,7 +273,7 @@ def _session(placed: PlacedGraph, name: str, observers: Sequence[str]) -> dict[s
     ends = [spec.endpoint for spec in placed.machines]
     place = names.index(name) if name in names else len(names)
     nested: dict[str, Any] = {}
-    settings = session_settings(ends[place : place + 1], ends[:place])
+    settings = session_settings(ends[place : place + 1], ends[:place], Limits.of(placed))
     settings |= {
         "transport/link/tls": tls_settings(Path()),
         "access_control": party_access(placed, name, observers),

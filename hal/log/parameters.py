@@ -37,6 +37,10 @@ class LogJoints(Parameters):
         None, text="their speeds [rad/s]; none: differences of the angles"
     )
     torque: Columns | None = parameter(None, text="their torques [N m]; none: zeros")
+    commanded: Columns | None = parameter(
+        None,
+        text="commanded torques [N m], of which `aloft robot identify` finds the delay; no port has them",
+    )
 
 
 class LogContact(Parameters):

@@ -73,6 +73,8 @@ class PlayedLog:
     gaps: int = 0
     imu_repeats: float = 0.0
     joint_repeats: float = 0.0
+    commanded: Array2D | None = None
+    """Commanded torques at the ticks (n, n_joints) [N m], for identification."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,7 @@ def play(log: LogFile, params: LogParameters, robot: RobotDescription, period: f
     if imu is not None:
         gyro = player.take(imu.angular_velocity, 3, "rad/s", "imu.angular_velocity")
         force = player.take(imu.specific_force, 3, "m/s^2", "imu.specific_force")
-    columns, joints = _joints(player, names)
+    columns, (*joints, commanded) = _joints(player, names)
     contacts = _contacts(player)
     truth = params.truth
     place = turn = None
@@ -176,15 +178,20 @@ def play(log: LogFile, params: LogParameters, robot: RobotDescription, period: f
     played.count, played.rate = len(longest.stamps), float(1.0 / np.mean(steps))
     played.gaps = int((steps > GAP * np.median(steps)).sum())
     played.rows = _rows(player, gyro, force, mounting, columns, joints, contacts, place, turn)
+    if commanded is not None:
+        played.commanded = np.zeros_like(played.rows.torque)
+        own = [k for k, column in enumerate(columns) if column >= 0]
+        at = at_times(commanded.stamps, commanded.values, player.times, True)
+        played.commanded[:, own] = at[:, [columns[k] for k in own]]
     _warn(player, names, columns)
     return played
 
 
 def _joints(player: _Player, names: Sequence[str]) -> tuple[list[int], tuple[_Series | None, ...]]:
-    """Return the column of every joint, and angles, speeds and torques."""
+    """Return the column of every joint, and angles, speeds, torques and commanded torques."""
     given = player.params.joints
     if given is None:
-        return [-1] * len(names), (None, None, None)
+        return [-1] * len(names), (None,) * 4
     listed: Sequence[str] = names
     if isinstance(given.names, str):
         listed = player.log.texts.get(given.names, ())
@@ -216,6 +223,7 @@ def _joints(player: _Player, names: Sequence[str]) -> tuple[list[int], tuple[_Se
             ("position", given.position, "rad"),
             ("velocity", given.velocity, "rad/s"),
             ("torque", given.torque, "N m"),
+            ("commanded", given.commanded, "N m"),
         )
     )
 

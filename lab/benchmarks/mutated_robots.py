@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from ...hal.simulated.mujoco_model import mujoco_spec
 from ...robots.description import (
@@ -118,7 +119,7 @@ def _tried(
     found: dict[str, Counter[str]] = {kind: Counter() for kind in tried.mistakes}
     kinds, files = list(tried.mistakes), list(tried.files)
     with tempfile.TemporaryDirectory(prefix="aloft-mutated-") as folder:
-        usual: dict[str, frozenset[str]] = {}
+        usual: dict[str, Usual] = {}
         for number in range(count):
             draw = random.Random(seed + number)
             kind = kinds[number % len(kinds)]
@@ -126,7 +127,7 @@ def _tried(
             path = Path(folder) / file
             if file not in usual:
                 _write(path, tried.files[file])
-                usual[file] = _said(path)
+                usual[file] = _usual(path)
             data = tried.mistakes[kind](draw, tried.files[file])
             if data is None:
                 found[kind]["nothing to change"] += 1
@@ -143,9 +144,21 @@ def _counted(counter: Counter[str]) -> str:
     return ", ".join(f"{count} {what}" for what, count in sorted(counter.items()))
 
 
-def _said(path: Path) -> frozenset[str]:
-    """Read a file and return the remarks on it."""
-    return frozenset(_said_of(read(path)))
+class Usual(NamedTuple):
+    """What is read of a file before it is made wrong: the remarks, and the robot without what is only read or seen."""
+
+    said: frozenset[str]
+    robot: RobotDescription
+
+
+def _usual(path: Path) -> Usual:
+    """Read a good file."""
+    found = read(path)
+    return Usual(frozenset(_said_of(found)), _robot(found))
+
+
+def _robot(found: ReadRobot) -> RobotDescription:
+    return found.description.model_copy(update={"text": "", "looks": {}})
 
 
 def _said_of(found: ReadRobot) -> set[str]:
@@ -160,7 +173,7 @@ def _said_of(found: ReadRobot) -> set[str]:
     return {*found.notes, *missing_meshes(found.description), *remarks}
 
 
-def _outcome(path: Path, data: bytes, usual: frozenset[str]) -> tuple[str, str]:
+def _outcome(path: Path, data: bytes, usual: Usual) -> tuple[str, str]:
     """Return the outcome of reading a file, and the remark that decided it."""
     _write(path, data)
     try:
@@ -174,8 +187,10 @@ def _outcome(path: Path, data: bytes, usual: frozenset[str]) -> tuple[str, str]:
         return "reported", error.errors[0].message
     except Exception as error:  # noqa: BLE001  # this is what is looked for
         return "crash", f"{type(error).__name__}: {error}"
-    more = sorted(_said_of(found) - usual)
-    return ("accepted and said", more[0]) if more else ("accepted", "")
+    more = sorted(_said_of(found) - usual.said)
+    if more:
+        return "accepted and said", more[0]
+    return ("the same robot" if _robot(found) == usual.robot else "accepted"), ""
 
 
 def _write(path: Path, data: bytes) -> None:

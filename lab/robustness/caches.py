@@ -93,9 +93,7 @@ def outcome(cache: Path, **extra: str) -> str:
 
 
 def _files(home: Path, kind: str) -> list[Path]:
-    return [
-        p for p in sorted((home / "aloft" / kind).rglob("*")) if p.suffix != ".lock" and p.is_file()
-    ]
+    return [p for p in sorted((home / "aloft" / kind).rglob("*")) if p.is_file()]
 
 
 def rows(turns: int = 5) -> Iterator[Sequence[str]]:
@@ -114,19 +112,19 @@ def rows(turns: int = 5) -> Iterator[Sequence[str]]:
                     same += outcome(home) == expected
                     shutil.rmtree(home)
                 yield kind, (damage.__doc__ or "").rstrip("."), f"{same} of {turns}"
-        yield from _libraries(Path(folder), draw, turns)
+        yield from _functions(Path(folder), draw, turns)
         for name, home in _homes(Path(folder)):
             found = outcome(home, home=str(home))
             yield "the cache folder", name, f"{int(found == expected)} of 1"
 
 
-def _libraries(folder: Path, draw: random.Random, turns: int) -> Iterator[Sequence[str]]:
-    """Damage the planner's compiled code; the compiled functions are evaluated by a child."""
+def _functions(folder: Path, draw: random.Random, turns: int) -> Iterator[Sequence[str]]:
+    """Damage the planner's kept functions; a child evaluates them."""
     evaluate = (
         "from aloft.robots.description import find_robot;"
         "from aloft.planner.models.symbolic_model import SymbolicModel;"
         "from aloft.planner.problem.stage_functions import make_coordinates;"
-        "from aloft.planner.solving.compilation import load_pieces;"
+        "from aloft.planner.solving.kept_functions import load_pieces;"
         "model = SymbolicModel(find_robot('bruce'));"
         "sagittal = make_coordinates(model, 'sagittal');"
         "pieces = load_pieces(model, sagittal, names=('stance', 'flight'));"

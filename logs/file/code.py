@@ -1,18 +1,17 @@
 """The code that a graph runs and that is not aloft's: which blocks need it, where it is, and whether it is trusted.
 
 A recording that somebody sends may name a module beside itself, an FMU or an exported library. To run it again
-would run that code. It is known by a digest of its content. The user's cache folder holds an empty file for each
-digest that is trusted: of what his own runs executed, and of what he has allowed with ``--trust``.
+would run that code. It is known by a digest of its content. The user's cache folder holds a file for each digest
+that is trusted: of what his own runs executed, and of what he has allowed with ``--trust``.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from ...files.cache import Cache
 from ...files.nodes import plain
 from ...robots.robot_description import RobotDescription
 from ...runtime.language.block import Block
@@ -21,6 +20,8 @@ from ...runtime.language.errors import AloftError
 from ...runtime.language.flat_graph import FlatBlock, FlatGraph
 from ...runtime.language.importing import find_source, without_imports
 from ...runtime.language.registry import find_block
+
+TRUSTED = Cache("trusted")
 
 
 class UntrustedCodeError(AloftError):
@@ -97,24 +98,16 @@ def code_of(graph: FlatGraph, robot: RobotDescription | None = None) -> list[Cod
     return list(found.values())
 
 
-def trusted_folder() -> Path:
-    """Return the folder of trusted digests: ``aloft/trusted`` in the user's cache folder."""
-    root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(root) / "aloft" / "trusted"
-
-
 def is_trusted(code: Code) -> bool:
     """Return whether the user has run this code, or allowed it."""
-    return (trusted_folder() / code.digest).is_file()
+    return TRUSTED.load(code.digest) is not None
 
 
 def remember(codes: Iterable[Code]) -> None:
     """Trust this code from now on. A cache folder that cannot be written is no error: it is asked for again."""
-    folder = trusted_folder()
-    with suppress(OSError):
-        for code in codes:
-            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            (folder / code.digest).touch(mode=0o600)
+    for code in codes:
+        if not is_trusted(code):
+            TRUSTED.save(code.digest, b"")
 
 
 def expect_trusted(codes: Sequence[Code], recording: Path) -> None:

@@ -1,37 +1,38 @@
 """The content of a recording, defined in one place for the code that writes one and that reads one.
 
-A recording is a Rerun file (``.rrd``) with these entities; ``B/P/F`` stands for a block's path, an
-output and a field. All but the static ones are on the timelines ``t`` (exact nanoseconds) and
-``tick``.
+A recording is a Rerun file (``.rrd``). These entities hold a component ``aloft:record``, see ``records``; those with
+``*`` are on the timelines ``t`` (exact nanoseconds) and ``tick``:
 
 ===================  ===============================================================================
-``__properties``     ``aloft``: ``header`` (JSON of ``Header``) and its main parts once more, to be
-                     read in the viewer; ``files``: ``contents`` (JSON of ``Header.contents``);
-                     ``outcome``: ``outcome`` (JSON of ``RunResult.to_json``), written last, so a
-                     recording without it was cut off
+``header``           JSON of ``Header``, without ``contents``
+``files``            JSON of ``Header.contents``
+``rows`` *           the bytes of the bus after each of some ticks without a gap, at most half a second of them; see
+                     ``row_codec``
+``held/N`` *         the same of the large fields of slow blocks, in the ticks in which these ran; see ``held_fields``
+``keyframes`` *      the bytes of bus and state before tick k ran, from which a run can go on
+``notes`` *          JSON of a list of ``Note``: life cycle, overruns, faults, parameter changes, dropped ticks
+``outcome``          JSON of ``RunResult.to_json``, written last, so a recording without it was cut off
+``end/0, 1``         what closes the file
+===================  ===============================================================================
+
+The others are for the viewer; ``B/P/F`` stands for a block's path, an output and a field:
+
+===================  ===============================================================================
+``__properties``     the main parts of the header and of the outcome
 ``graph``            the graph as it ran, after includes, sub-graphs and overrides, as text
-``rows``             ``aloft:packed``: the bytes of the bus after each of some ticks without a
-                     gap, at most half a second of them; see ``row_codec``
-``held/N``           ``aloft:packed``: the same of the large fields of slow blocks, in the ticks in
-                     which these ran; see ``held_fields``
-``signals/B/P/F``    the curve of a field as ``Scalars``, for the viewer: of those in the plots that
-                     it shows first, and of as many ticks as the curve needs; see ``drawing``
-``keyframes``        ``aloft:bus`` and ``aloft:state`` at tick k: the bytes of both buffers before
-                     tick k ran, from which a run can go on
-``notes``            ``aloft:note``: JSON of a ``Note``: life cycle, overruns, faults, parameter
-                     changes, dropped ticks
-``states/NAME``      each change of a number whose values have names, and of a truth value, for
-                     the viewer; ``state_lanes.all_lanes`` chooses the short names
-``limits/B/P/F``     the limits of a field by the robot's description, for the viewer
-``plots``            what is computed for plots only, for the viewer: see ``contacts``
-``events``           notes, changes of state, lift-off and touchdown as text, for the viewer
-``world``            the robot in 3D, for the viewer; see ``scene``
-``times``            the time each block took, as text, for the viewer; written last
+``signals/B/P/F``    the curve of a field as ``Scalars``: of those in the plots that it shows first, and of as many
+                     ticks as the curve needs; see ``drawing``
+``states/NAME``      each change of a number whose values have names, and of a truth value;
+                     ``state_lanes.all_lanes`` chooses the short names
+``limits/B/P/F``     the limits of a field by the robot's description
+``plots``            what is computed for plots only: see ``contacts``
+``events``           notes, changes of state, lift-off and touchdown as text
+``world``            the robot in 3D; see ``scene``
+``times``            the time each block took, as text; written last
 ===================  ===============================================================================
 
-Row k is the bus after all outputs of tick k were written. Every message of the file has a checksum:
-see ``messages``. ``viewing.drawing`` says how much is drawn into a recording. The other curves, and
-the rest of the scene, are drawn from the rows when ``aloft view`` shows it.
+Row k is the bus after all outputs of tick k were written. ``viewing.drawing`` says how much is drawn into a recording.
+The other curves, and the rest of the scene, are drawn from the rows when ``aloft view`` shows it.
 """
 
 from __future__ import annotations
@@ -54,13 +55,12 @@ from ...runtime.language.signals import Slot
 
 MOST_OF_BUFFER = 1 << 30
 """Bytes of a bus or a state, at most."""
-FORMAT = 6
+FORMAT = 7
 """The number of this format, the only one that is read."""
-SIGNALS, STATES, KEYFRAMES, NOTES, EVENTS = "signals", "states", "keyframes", "notes", "events"
+SIGNALS, STATES, EVENTS = "signals", "states", "events"
 LIMITS, TIMES, WORLD, GRAPH, DIAGRAM = "limits", "times", "world", "graph", "diagram"
 PLOTS = "plots"
-ROWS, HELD = "rows", "held"
-BUS, STATE, NOTE, PACKED = "bus", "state", "note", "packed"
+RECORD = "record"
 
 
 @dataclass(frozen=True)

@@ -6,24 +6,15 @@ import os
 from bisect import bisect_left
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .format import HELD, PACKED, ROWS, Header, RecordedField
+from .format import Header, RecordedField
 from .held_fields import FieldGroup, split_bus
-from .messages import (
-    Content,
-    FileMessage,
-    RecordingError,
-    Scan,
-    located,
-    tables_at,
-    unreadable,
-)
+from .records import Content, Record, RecordingError, Scan
 from .row_codec import unpack, unpack_bytes
 
 MOST_THREADS = 4
@@ -41,84 +32,56 @@ TickRows = tuple[NDArray[np.int64], NDArray[np.uint8]]
 """Ticks (n,) and rows (n, bytes)."""
 
 
-@dataclass(frozen=True)
-class _PackedPiece:
-    """Some ticks, ``period`` after one another: the message that holds them, and the row of its table."""
-
-    message: FileMessage
-    row: int
-    first: int
-    last: int
-    period: int = 1
-
-    @property
-    def ticks(self) -> NDArray[np.int64]:
-        """The ticks, (n,)."""
-        return np.arange(self.first, self.last + 1, self.period, dtype=np.int64)
-
-
 class PackedGroup:
     """The packed rows of one part of the bus: of its base, or of a held group, whose number is ``held``."""
 
     def __init__(self, found: Scan, part: FieldGroup, held: int | None = None) -> None:
         self._found, self._part = found, part
-        self._content = Content.ROWS if held is None else Content.HELD
-        self._entity = f"/{ROWS}" if held is None else f"/{HELD}/{held}"
-        sealed = found.sealed and held is None  # the seal does not say of which group a message is
-        pieces = self._sealed() if sealed else self._looked_for()
+        if held is None:
+            pieces = found.of(Content.ROWS)
+        else:
+            pieces = [piece for piece in found.of(Content.HELD) if piece.group == held]
         self._pieces = sorted(pieces, key=lambda piece: piece.first)
         self._lasts = [piece.last for piece in self._pieces]
-        self._known: tuple[_PackedPiece, NDArray[np.uint8]] | None = None
+        self._known: tuple[Record, NDArray[np.uint8]] | None = None
 
-    def _sealed(self) -> Iterator[_PackedPiece]:
-        """Yield the pieces of a file with seals, which say what is in each message."""
-        for message in self._found.of(self._content):
-            yield _PackedPiece(message, 0, message.first, message.last)
+    def ticks_of(self, piece: Record) -> NDArray[np.int64]:
+        """Return the ticks of a piece, (n,)."""
+        return np.arange(piece.first, piece.last + 1, self._part.period, dtype=np.int64)
 
-    def _looked_for(self) -> Iterator[_PackedPiece]:
-        """Yield the pieces of a file that another program has written again, which may have put
-        several into one message."""
-        for message, name, batch in located(self._found, self._content):
-            if name == self._entity:
-                for row in range(len(batch)):
-                    first, rows = self._unpacked(message, batch, row, (0, 0))
-                    last = first + (len(rows) - 1) * self._part.period
-                    yield _PackedPiece(message, row, first, last, self._part.period)
-
-    def _unpacked(
-        self, message: FileMessage, batch: Any, row: int, part: tuple[int, int] | None = None
-    ) -> tuple[int, NDArray[np.uint8]]:
-        """Unpack first tick and rows (n, bytes) of a piece, or of each row the bytes ``part`` only."""
+    def unpack(
+        self, piece: Record, part: tuple[int, int] | None = None, file: BinaryIO | None = None
+    ) -> NDArray[np.uint8]:
+        """Unpack the rows (n, bytes) of a piece, or of each row the bytes ``part`` only."""
+        found = self._found
+        packed = found.payload(piece) if file is None else found.read_payload(file, piece)
         try:
-            packed = batch[f"aloft:{PACKED}"][row].values.to_numpy().tobytes()
             first, rows = unpack(packed) if part is None else unpack_bytes(packed, *part)
             last = first + (len(rows) - 1) * self._part.period
-            if self._found.sealed and (first, last) != (message.first, message.last):
-                raise ValueError("these rows are not of the ticks that their seal names")
+            if (first, last) != (piece.first, piece.last):
+                raise ValueError("these rows are not of the ticks that their record names")
             if part is None and rows.shape[1] != self._part.layout.size:
                 raise ValueError("these rows belong to another layout")
-        except (ValueError, KeyError) as error:
-            raise unreadable(self._found, message, error) from error
-        return first, rows
-
-    def unpack(self, piece: _PackedPiece, part: tuple[int, int] | None = None) -> NDArray[np.uint8]:
-        """Unpack the rows (n, bytes) of a piece, or of each row the bytes ``part`` only."""
-        _, batch = tables_at(self._found, piece.message)
-        return self._unpacked(piece.message, batch, piece.row, part)[1]
+        except ValueError as error:
+            raise found.unreadable(piece, error) from error
+        return rows
 
     @cached_property
     def ticks(self) -> NDArray[np.int64]:
         """The ticks of the rows in order, (ticks,)."""
-        count = sum((m.last - m.first) // m.period + 1 for m in self._pieces)
-        if any(m.last < m.first for m in self._pieces) or count > MOST_TICKS * len(self._pieces):
+        period = self._part.period
+        count = sum((piece.last - piece.first) // period + 1 for piece in self._pieces)
+        if any(piece.last < piece.first for piece in self._pieces) or count > MOST_TICKS * len(
+            self._pieces
+        ):
             raise RecordingError(
-                f"{self._found.path} says that {len(self._pieces)} messages hold {count} ticks; the "
+                f"{self._found.path} says that {len(self._pieces)} records hold {count} ticks; the "
                 f"expected number is {MOST_TICKS} in each at most"
             )
-        found = [piece.ticks for piece in self._pieces]
+        found = [self.ticks_of(piece) for piece in self._pieces]
         return np.unique(np.concatenate([np.zeros(0, np.int64), *found]))
 
-    def between(self, first: int, last: int) -> Iterator[_PackedPiece]:
+    def between(self, first: int, last: int) -> Iterator[Record]:
         """Yield the pieces with ticks from ``first`` up to, without, ``last``."""
         for piece in self._pieces[bisect_left(self._lasts, first) :]:
             if piece.first >= last:
@@ -138,7 +101,7 @@ class PackedGroup:
         piece = self._pieces[bisect_left(self._lasts, tick)]
         if self._known is None or self._known[0] is not piece:
             self._known = piece, self.unpack(piece)
-        row: NDArray[np.uint8] = self._known[1][(tick - piece.first) // piece.period]
+        row: NDArray[np.uint8] = self._known[1][(tick - piece.first) // self._part.period]
         return row
 
     def all(self, part: tuple[int, int] | None = None) -> NDArray[np.uint8]:
@@ -149,8 +112,8 @@ class PackedGroup:
         expect_room(self._found, len(ticks) * size)
         rows = np.empty((len(ticks), size), np.uint8)
 
-        def unpack_one(piece: _PackedPiece) -> None:
-            rows[np.searchsorted(ticks, piece.ticks)] = self.unpack(piece, part)
+        def unpack_one(piece: Record) -> None:
+            rows[np.searchsorted(ticks, self.ticks_of(piece))] = self.unpack(piece, part)
 
         with ThreadPoolExecutor(min(MOST_THREADS, os.cpu_count() or 1)) as pool:
             for _ in pool.map(unpack_one, self._pieces):
@@ -197,7 +160,7 @@ class PackedRows:
         """Yield the ticks from ``first`` up to, without, ``last``, and their rows, some at a time."""
         most = max(1, AT_ONCE // max(1, self._bus.size))
         for piece in self._base.between(first, last):
-            ticks, base = piece.ticks, self._base.unpack(piece)
+            ticks, base = self._base.ticks_of(piece), self._base.unpack(piece)
             low, high = bisect_left(ticks, first), bisect_left(ticks, last)
             if not self._bus.held:
                 yield ticks[low:high], base[low:high]

@@ -25,30 +25,18 @@ from numpy.typing import NDArray
 from ...runtime.language.layout import only_field
 from ...runtime.running.sink import Note
 from ...runtime.running.snapshot import Snapshot
-from .format import (
-    BUS,
-    FORMAT,
-    KEYFRAMES,
-    NOTE,
-    NOTES,
-    STATE,
-    Header,
-    RecordedField,
-    RecordedRows,
-)
-from .messages import (
+from .format import FORMAT, Header, RecordedField, RecordedRows
+from .packed_rows import MOST_KEPT, PackedRows, TickRows
+from .records import (
     Content,
     Damage,
-    FileMessage,
-    NoRunError,
+    Record,
     RecordingError,
     Scan,
     expect_intact,
-    scanned,
-    tables,
-    tables_at,
+    find_records,
 )
-from .packed_rows import MOST_KEPT, PackedRows, TickRows
+from .row_codec import unpack_keyframe
 
 if TYPE_CHECKING:
     from ...runtime.language.parameter_change import ParameterChange
@@ -71,7 +59,7 @@ class RecordedRun:
             layouts, robot.
         outcome: what ``RunResult.to_json`` gave; ``None`` if the recording was cut off.
         notes: life cycle, overruns, faults, parameter changes and dropped ticks, in order.
-        scan: the intact messages of the file.
+        scan: the intact records of the file.
     """
 
     path: Path
@@ -212,19 +200,13 @@ class RecordedRun:
         return np.concatenate(ticks), np.concatenate(rows)
 
     @cached_property
-    def _snapshots(self) -> Mapping[int, Any]:
-        """The message of each keyframe, or, without seals, the keyframe itself."""
-        if self.scan.sealed:
-            return {m.first: m for m in self.scan.of(Content.KEYFRAME)}
-        found: dict[int, Snapshot] = {}
-        for _, batch in tables(self.scan, Content.KEYFRAME, f"/{KEYFRAMES}"):
-            found |= {each.tick: each for each in _snapshots_in(batch)}
-        return dict(sorted(found.items()))
+    def _keyframes(self) -> Mapping[int, Record]:
+        return {record.first: record for record in self.scan.of(Content.KEYFRAME)}
 
     @property
     def keyframes(self) -> tuple[int, ...]:
         """The ticks before which a full snapshot was taken, in order."""
-        return tuple(self._snapshots)
+        return tuple(self._keyframes)
 
     def snapshot(self, tick: int) -> Snapshot:
         """Return the keyframe at ``tick``, for ``BoundGraph.restore``.
@@ -232,11 +214,12 @@ class RecordedRun:
         Raises:
             KeyError: there is no keyframe at that tick.
         """
-        found: Snapshot | FileMessage = self._snapshots[tick]
-        if isinstance(found, FileMessage):
-            (one,) = _snapshots_in(tables_at(self.scan, found)[1])
-            return one
-        return found
+        record = self._keyframes[tick]
+        data = self.scan.payload(record)
+        try:
+            return Snapshot(tick, *unpack_keyframe(data, record.whole))
+        except ValueError as error:
+            raise self.scan.unreadable(record, error) from error
 
     @property
     def parameter_changes(self) -> tuple[ParameterChange, ...]:
@@ -261,6 +244,26 @@ class RecordedRun:
         return int(ticks[-1] - self.header.first_tick + 1 - len(ticks)) if len(ticks) else 0
 
 
+def scan(path: Path) -> Scan:
+    """Look through a whole file, and verify every checksum; see ``find_records``.
+
+    Raises:
+        OSError: it cannot be read.
+        RecordingError: neither aloft nor Rerun can read it.
+    """
+    found, foreign = find_records(path)
+    if not foreign:
+        return found
+    from .rewritten import read_again  # imports what only such files need
+
+    try:
+        return read_again(found)
+    except RecordingError:
+        if found.damage:
+            return found  # bytes are missing, or there are too many
+        raise
+
+
 def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
     """Open a recording, also one that is being written just now. Every checksum is verified.
 
@@ -275,62 +278,71 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
         RecordingError: it is no such file, or was written by a later version.
     """
     path = Path(path)
-    found = scanned(path)
+    found = scan(path)
     if not damaged:
         expect_intact(found)
-    texts = _properties(found)
-    if "header" not in texts:
+    texts = {
+        record.content: found.text(record)
+        for record in found.of(Content.START, Content.FILES, Content.OUTCOME)
+    }
+    if Content.START not in texts:
         expect_intact(found)
-        if found.sealed or not found.messages:
-            raise RecordingError(f"{path} was cut off before its beginning was written")
-        raise NoRunError(f"{path} is a Rerun file, but not a recording of a run by aloft")
-    number, maker = _made_by(texts["header"])
-    if number != FORMAT:
-        newer = isinstance(number, int) and number > FORMAT
-        fix = f"update aloft to {maker or 'a newer one'}" if newer else (
-            f"read it with aloft {maker}" if maker else "read it with an older one"
-        )  # fmt: skip
-        raise RecordingError(
-            f"{path} has format {number}, this version of aloft reads {FORMAT}; {fix}"
-        )
-    notes = [
-        (row, Note(**json.loads(text)))
-        for _, batch in tables(found, Content.NOTES, f"/{NOTES}")
-        for row, text in zip(
-            batch[0].to_pylist(),  # the numbers of the rows, which grow in the order of writing
-            [text for (text,) in batch[f"aloft:{NOTE}"].to_pylist()],  # `flatten` imports 0.1 s
-            strict=True,
-        )
-    ]
-    outcome = json.loads(texts["outcome"]) if "outcome" in texts else None
-    ordered = tuple(note for _, note in sorted(notes, key=lambda entry: entry[0]))
+        _expect_format(path, *(found.maker or (FORMAT, "")))
+        if found.rewritten is not None and found.records:
+            raise RecordingError(
+                f"{_left_out(path)} the header; use the recording as aloft wrote it"
+            )
+        raise RecordingError(f"{path} was cut off before its beginning was written")
+    _expect_format(path, *_made_by(texts[Content.START]))
     try:
-        header = Header.from_json(texts["header"])
-        header = replace(header, contents=json.loads(texts.get("contents", "{}")))
+        header = Header.from_json(texts[Content.START])
+        header = replace(header, contents=json.loads(texts.get(Content.FILES, "{}")))
         header.expect_possible()
+        notes = tuple(
+            Note(**note)
+            for record in found.of(Content.NOTES)
+            for note in json.loads(found.text(record))
+        )
+        outcome = json.loads(texts[Content.OUTCOME]) if Content.OUTCOME in texts else None
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         reason = " ".join(str(error).split())
         raise RecordingError(f"{path} has a header that aloft does not write: {reason}") from error
-    run = RecordedRun(path, header, outcome, ordered, found)
-    if not found.sealed and not damaged:
+    run = RecordedRun(path, header, outcome, notes, found)
+    if found.rewritten is not None and not damaged:
         _expect_nothing_left_out(run)
     return run
 
 
+def _expect_format(path: Path, number: Any, maker: str) -> None:
+    """Raise ``RecordingError`` for a file of another format."""
+    if number == FORMAT:
+        return
+    newer = isinstance(number, int) and number > FORMAT
+    fix = f"update aloft to {maker or 'a newer one'}" if newer else (
+        f"read it with aloft {maker}" if maker else "read it with an older one"
+    )  # fmt: skip
+    raise RecordingError(f"{path} has format {number}, this version of aloft reads {FORMAT}; {fix}")
+
+
+def _left_out(path: Path) -> str:
+    return f"{path} was written again by another program, which left out"
+
+
 def _expect_nothing_left_out(run: RecordedRun) -> None:
     """Raise ``RecordingError`` where another program that wrote the file again has left something out."""
-    by = f"{run.path} was written again by another program, which left out"
-    if any(
-        "tick" not in b.schema.names for _, b in tables(run.scan, Content.KEYFRAME, f"/{KEYFRAMES}")
-    ):
-        raise RecordingError(
-            f"{by} the timeline 'tick'; keep it, or use the recording as aloft wrote it"
-        )
+    by = _left_out(run.path)
     lost = run.missing_ticks - run.dropped_ticks
     if run.outcome is not None and lost > 0:
         raise RecordingError(
             f"{by} {lost} ticks, as `rerun rrd split` and `filter` do; it has {len(run.ticks)}. Use the recording "
             "as aloft wrote it; aloft.logs.read(FILE, damaged=True) reads the rest"
+        )
+    records = run.scan.records
+    lost = records[-1].number + 1 - len(records)
+    if lost or not run.scan.closed:
+        raise RecordingError(
+            f"{by} {lost or 'the last'} records, such as keyframes or notes. Use the recording as aloft wrote it; "
+            "aloft.logs.read(FILE, damaged=True) reads the rest"
         )
 
 
@@ -341,26 +353,3 @@ def _made_by(header: str) -> tuple[Any, str]:
         return data.get("format", 0), str(data.get("versions", {}).get("aloft", ""))
     except (ValueError, AttributeError):
         return 0, ""
-
-
-def _properties(found: Scan) -> dict[str, str]:
-    """Return the texts under ``__properties``, by name."""
-    texts = {}
-    contents = (Content.START, Content.OUTCOME) if found.sealed else (Content.UNKNOWN,)
-    for content in contents:
-        for _, batch in tables(found, content, "/__properties/**", static=True):
-            for name in batch.schema.names:
-                values = batch[name].to_pylist()[0]
-                if isinstance(values, list) and values:
-                    texts[name.rpartition(":")[2]] = str(values[0])
-    return texts
-
-
-def _snapshots_in(batch: Any) -> Iterator[Snapshot]:
-    for k, tick in enumerate(batch["tick"].to_pylist()):
-        parts = {
-            name: batch[f"aloft:{name}"][k].values.to_numpy().tobytes()
-            for name in (BUS, STATE)
-            if f"aloft:{name}" in batch.schema.names
-        }
-        yield Snapshot(tick, parts.get(BUS, b""), parts.get(STATE, b""))

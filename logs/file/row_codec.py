@@ -31,6 +31,8 @@ MOST_BYTES = 1 << 26
 """Bytes of the rows that are packed together, but that one row may have more."""
 MOST_OF_ROW = 1 << 30
 """Bytes of a row that is read."""
+_BUS = Struct("<Q")
+"""Before a keyframe: the bytes of its bus."""
 _SIZES = Struct("<II")
 """Behind the head: the number of columns that change, and the bytes before compression."""
 
@@ -83,6 +85,25 @@ def unpack_bytes(data: bytes, begin: int, end: int) -> tuple[int, NDArray[np.uin
     low = begin // 8
     words = _words(data, begin, end)
     return _head(data)[3], np.ascontiguousarray(words[:, begin - 8 * low : end - 8 * low])
+
+
+def pack_keyframe(bus: bytes, state: bytes) -> tuple[bytes, int]:
+    """Compress bus and state; return them and their size before."""
+    import pyarrow as pa
+
+    whole = _BUS.pack(len(bus)) + bus + state
+    return pa.Codec("zstd", compression_level=LEVEL).compress(whole, asbytes=True), len(whole)
+
+
+def unpack_keyframe(data: bytes, size: int) -> tuple[bytes, bytes]:
+    """Return the bus and the state of a keyframe of ``size`` bytes. Raises ``ValueError``."""
+    if not _BUS.size <= size <= 2 * MOST_OF_ROW + _BUS.size:
+        raise ValueError(f"a keyframe cannot have {size} bytes")
+    whole = _decompressed(data, size)
+    behind = _BUS.size + _BUS.unpack_from(whole)[0]
+    if behind > size:
+        raise ValueError("a keyframe has not the bus that it says")
+    return whole[_BUS.size : behind], whole[behind:]
 
 
 def _head(data: bytes) -> tuple[bytes, int, int, int, int]:

@@ -51,6 +51,8 @@ BATCH, BATCH_BYTES = 1024, 1 << 24
 SLOW_FLUSH = 4.0
 """Number of flush periods for which ticks may wait that are fewer than those of one period of the
 graph."""
+INDEXED_TICKS = 1_000_000
+"""Ticks of a file, at most, that gets Rerun's index: it is made in memory, of every chunk."""
 DRAW_PERIOD = 10.0
 """Seconds between two pieces of what the viewer shows: each costs the viewer time and memory."""
 
@@ -98,7 +100,14 @@ class RecorderProcess:
     def _open(self, header: Header) -> None:
         assert self._output is not None
         self._begins = True
-        self._writer = RecordingWriter(self._output.target, header, output=self._output)
+        self._writer = RecordingWriter(
+            self._output.target, header, output=self._output, indexed=self._is_short()
+        )
+
+    def _is_short(self) -> bool:
+        """Tell whether the file's index has room in memory until the file is closed."""
+        ticks = self._task.split or self._header.ticks
+        return ticks is not None and ticks <= INDEXED_TICKS
 
     def _go_back(self, tick: int) -> None:
         """Go on with ``tick``, which has been run before, in a new file and as a new run of the viewer."""

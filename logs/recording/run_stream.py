@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -15,8 +13,6 @@ from ..file.format import (
     EVENTS,
     GRAPH,
     LIMITS,
-    NOTE,
-    NOTES,
     SIGNALS,
     TIMES,
     Header,
@@ -127,16 +123,10 @@ class RunStream:
             self._scene.write(batch)
 
     def write_notes(self, notes: Sequence[Note]) -> None:
-        """Write notes, in order, as data and as text for the viewer."""
-        import rerun as rr
-
+        """Write notes, in order, as text."""
         if not notes:
             return
         ticks = np.array([note.tick for note in notes])
-        times = self._times(ticks)
-        texts = [json.dumps(asdict(note)) for note in notes]
-        columns = rr.DynamicArchetype.columns("aloft", components={NOTE: texts})
-        self.stream.send_columns(f"{self._root}{NOTES}", times, columns)
         self._write_events(ticks, [note.text for note in notes], [note.level for note in notes])
 
     def write_rest(self) -> None:

@@ -1,48 +1,31 @@
 """Writes a recording piece by piece: rows, keyframes and notes as they come, the outcome at the end.
 
-``format`` describes the content and ``messages`` the file. Rerun makes the messages in memory; they
-are sealed and written here. Whatever was written is with the operating system when the call
-returns, so a process that is killed afterwards does not lose it, and the file always ends with a
-whole message.
+``format`` describes the content, ``records`` the records in the file, and ``record_stream`` writes them.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...runtime.running.sink import Note, parameter_note
 from ...runtime.running.snapshot import Snapshot
-from ..file.format import BUS, HELD, KEYFRAMES, PACKED, ROWS, STATE, Header, spans, time_columns
+from ..file.format import FORMAT, Header, spans, time_columns
 from ..file.held_fields import split_bus
-from ..file.index import Index
-from ..file.messages import (
-    ARROW,
-    CLOSING,
-    END,
-    FILE_HEAD,
-    HEAD,
-    SEAL_SIZE,
-    Content,
-    FileMessage,
-    closing,
-    sealed,
-    split,
-)
-from ..file.row_codec import pack
+from ..file.records import Content, Record, packed_text
+from ..file.row_codec import pack, pack_keyframe
 from ..viewing.blueprint import recording_blueprint
 from ..viewing.drawing import RECORDED
 from .output_file import OutputFile, reserve_output
+from .record_stream import RecordStream
 from .run_stream import RunStream
 
 if TYPE_CHECKING:
@@ -66,6 +49,7 @@ class RecordingWriter:
         header: what is known before the first tick.
         recording_id: by default the graph's name; recordings of one run hold the same data.
         output: the file reserved for it, if that was done before.
+        indexed: whether the file gets Rerun's index at its end, which takes memory for each chunk until then.
 
     Attributes:
         recorded: the number of ticks in the file.
@@ -81,22 +65,21 @@ class RecordingWriter:
         header: Header,
         recording_id: str = "",
         output: OutputFile | None = None,
+        *,
+        indexed: bool = True,
     ) -> None:
         import rerun as rr
 
         self.output = output or reserve_output(Path(path))
         self.header = header
         self.path = self.output.target
-        self._size = self._messages = self._drawable = 0
-        self._begun = False
-        self._index = Index(SEAL_SIZE)
-        self.recorded = 0
+        self.recorded = self._drawable = 0
         self._undrawn: list[tuple[NDArray[np.int64], NDArray[np.uint8]]] = []
         self._stream = rr.RecordingStream(
             "aloft", recording_id=recording_id or header.name, send_properties=False
         )
         rr.set_log_time_enabled(False, recording=self._stream)
-        self._made = self._stream.binary_stream()
+        self._records = RecordStream(self._stream, self.output, index=indexed)
         self._bus = split_bus(header)
         self._before: NDArray[np.uint8] | None = None
         self._last = -2
@@ -108,8 +91,9 @@ class RecordingWriter:
         import rerun as rr
 
         header = self.header
+        whole = {"format": FORMAT, "versions": dict(header.versions)}
         about = {
-            "header": replace(header, contents={}).to_json(),
+            "about": json.dumps(whole),
             "name": header.name,
             "graph": header.graph,
             "base_rate_hz": repr(header.base_rate),
@@ -119,14 +103,20 @@ class RecordingWriter:
             "machine": json.dumps(dict(header.machine)),
             "schema_hashes": json.dumps(header.schema_hashes),
         }
+        self._put_text(Content.START, replace(header, contents={}).to_json())
+        self._put_text(Content.FILES, json.dumps(dict(header.contents)))
         self._stream.send_property("aloft", rr.AnyValues(**about))
-        files = json.dumps(dict(header.contents))
-        self._stream.send_property("files", rr.AnyValues(contents=files))
-        self._put(Content.START)
         layout = recording_blueprint(header, main_only=RECORDED.main_only)
         rr.send_blueprint(layout, make_active=False, make_default=True, recording=self._stream)
         self._run.write_start()
-        self._put(Content.PICTURE)
+        self._records.put_drawn()
+
+    def _put_text(self, content: Content, text: str, times: Sequence[Any] = (), first: int = 0, last: int = -1) -> None:  # fmt: skip
+        data, size = packed_text(text)
+        self._records.put(Record(content, first=first, last=last, whole=size), data, times)
+
+    def _times(self, tick: int) -> list[Any]:
+        return time_columns(self.header, np.array([tick]))
 
     def write_rows(self, ticks: NDArray[np.int64], rows: NDArray[np.uint8]) -> None:
         """Write the bus (n, bytes) after each of ``ticks`` (n,), which come in order.
@@ -178,8 +168,9 @@ class RecordingWriter:
             end = start + 1
             while end < min(len(ticks), start + most) and ticks[end] - ticks[end - 1] == period:
                 end += 1
-            self._send_packed(f"{HELD}/{number}", int(ticks[start]), rows[start:end])
-            self._put(Content.HELD, int(ticks[start]), int(ticks[end - 1]))
+            first, last = int(ticks[start]), int(ticks[end - 1])
+            held = Record(Content.HELD, group=number, first=first, last=last)
+            self._records.put(held, pack(first, rows[start:end]), self._times(first))
             start = end
 
     def _write_packed(self, first: int, rows: NDArray[np.uint8]) -> None:
@@ -198,18 +189,9 @@ class RecordingWriter:
             self._write_packed(first + half, rows[half:])
 
     def _write_whole(self, first: int, rows: NDArray[np.uint8]) -> None:
-        self._send_packed(ROWS, first, rows)
-        self._put(Content.ROWS, first, first + len(rows) - 1)
+        record = Record(Content.ROWS, first=first, last=first + len(rows) - 1)
+        self._records.put(record, pack(first, rows), self._times(first))
         self.recorded += len(rows)
-
-    def _send_packed(self, entity: str, first: int, rows: NDArray[np.uint8]) -> None:
-        import rerun as rr
-
-        packed = pack(first, rows)
-        # as an Arrow array: Rerun would make a Python object of each byte of a NumPy array
-        column = rr.DynamicArchetype.columns("aloft", components={PACKED: _bytes(packed)})
-        times = time_columns(self.header, np.array([first]))
-        self._stream.send_columns(entity, times, list(column.partition([len(packed)])))
 
     def draw(self) -> None:
         """Write for the viewer what has come since this was called last."""
@@ -218,27 +200,23 @@ class RecordingWriter:
         ticks, rows = (np.concatenate(parts) for parts in zip(*self._undrawn, strict=True))
         self._undrawn, self._drawable = [], 0
         self._run.write_rows(ticks, rows)
-        self._put(Content.PICTURE, int(ticks[0]), int(ticks[-1]))
+        self._records.put_drawn()
 
     def write_keyframe(self, snapshot: Snapshot) -> None:
         """Write all that the graph remembered before ``snapshot.tick`` ran."""
-        import rerun as rr
-
-        columns = []
-        for name, data in ((BUS, snapshot.bus), (STATE, snapshot.state)):
-            if data:
-                column = rr.DynamicArchetype.columns("aloft", components={name: _bytes(data)})
-                columns += list(column.partition([len(data)]))
-        times = time_columns(self.header, np.array([snapshot.tick]))
-        self._stream.send_columns(KEYFRAMES, times, columns)
-        self._put(Content.KEYFRAME, snapshot.tick, snapshot.tick)
+        data, size = pack_keyframe(snapshot.bus, snapshot.state)
+        tick = snapshot.tick
+        record = Record(Content.KEYFRAME, first=tick, last=tick, whole=size)
+        self._records.put(record, data, self._times(tick))
 
     def write_notes(self, notes: Sequence[Note]) -> None:
         """Write notes, in order, as data and as text for the viewer; at once, as a run that is late in
         each tick has many."""
         if notes:
             self._run.write_notes(notes)
-            self._put(Content.NOTES, notes[0].tick, notes[-1].tick)
+            first, last = notes[0].tick, notes[-1].tick
+            text = json.dumps([asdict(note) for note in notes])
+            self._put_text(Content.NOTES, text, self._times(first), first, last)
 
     def write_outcome(self, outcome: dict[str, Any]) -> None:
         """Write the outcome of the run. It comes last."""
@@ -247,48 +225,11 @@ class RecordingWriter:
         self.draw()
         self._run.write_rest()
         self._run.write_times(outcome)
-        self._put(Content.PICTURE)
-        values = {"outcome": json.dumps(outcome), "run_hash": str(outcome.get("run_hash", ""))}
-        self._stream.send_property("outcome", rr.AnyValues(**values))
-        self._put(Content.OUTCOME)
-
-    def _put(self, content: Content, first: int = 0, last: int = -1) -> None:
-        """Seal and write what Rerun has made of what was sent. Raises ``OSError``."""
-        data = self._made.read(flush=True) or b""
-        out = bytearray()
-        known, messages = 0, self._messages
-        if data and not self._begun:
-            out += data[:FILE_HEAD]
-            known, self._begun = crc32(data[:FILE_HEAD]), True
-        index, places = b"", {}
-        for offset, head, body in split(data):
-            kind = HEAD.unpack(head)[0]
-            if kind == END:
-                index = body
-                break
-            places[offset + HEAD.size] = self._size + len(out) + HEAD.size
-            holds = content if kind == ARROW else Content.PICTURE
-            seal = FileMessage(0, 0, ARROW, holds, messages, first, last)
-            out += sealed(head, body, seal, known)
-            known = 0
-            messages += 1
-        self._write(bytes(out))
-        self._index.add(index, places)
-        self._messages = messages
-
-    def _write(self, data: bytes) -> None:
-        """Write all of ``data`` at the file's end, or, if there is no room, nothing of it."""
-        rest = memoryview(data)
-        at = self._size
-        try:
-            while rest:
-                count = os.pwrite(self.output.descriptor, rest, at)
-                rest, at = rest[count:], at + count
-        except OSError as error:
-            os.ftruncate(self.output.descriptor, self._size)
-            why = error.strerror or error
-            raise OSError(f"{self.path} cannot be written any further ({why})") from error
-        self._size = at
+        names = [name for name in ("success", "reason", "run_hash") if outcome.get(name)]
+        if names:
+            shown = rr.AnyValues(**{name: str(outcome[name]) for name in names})
+            self._stream.send_property("outcome", shown)
+        self._put_text(Content.OUTCOME, json.dumps(outcome))
 
     def close(self) -> str:
         """Close the file and give it its name. Returns a warning if something was odd about it.
@@ -299,33 +240,18 @@ class RecordingWriter:
         try:
             self.draw()
             self._run.write_rest()
-            self._put(Content.PICTURE)
-            self._write_closing()
+            self._records.close()
         finally:
             warning = self.abandon()
         return warning
-
-    def _write_closing(self) -> None:
-        """Close the file, without an index where there is no room for it: only Rerun's tools use it."""
-        try:
-            self._write(closing(self._size, self._index.whole(), self._messages))
-        except OSError:
-            self._write(CLOSING)
 
     def abandon(self) -> str:
         """Give the file its name as it is, after a failure. Returns a warning or nothing."""
         try:
             return self.output.publish()
         finally:
-            self._stream.disconnect()
+            self._records.abandon()
             self.output.close()
-
-
-def _bytes(data: bytes) -> Any:
-    """Wrap bytes in an Arrow array that shares their memory."""
-    import pyarrow as pa
-
-    return pa.Array.from_buffers(pa.uint8(), len(data), [None, pa.py_buffer(data)])
 
 
 @dataclass(frozen=True)

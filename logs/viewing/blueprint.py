@@ -1,7 +1,8 @@
 """The layout in which the viewer shows a run, made from the graph.
 
 The robot in 3D and its states are on the left. On the right are tabs: the main signals, each
-block's signals, the blocks' times and the graph.
+block's signals, the blocks' times and the graph. Of a graph without a robot the tabs fill the window, with
+states and events in a strip below them.
 
 A user may write a layout too: ``view.yaml`` beside a graph, or any file for ``--layout``::
 
@@ -83,19 +84,15 @@ def recording_blueprint(
         *((rrb.Spatial2DView(origin=f"/{DIAGRAM}", name="Diagram"),) if diagram else ()),
         active_tab=0,
     )
-    below = rrb.Tabs(
-        states_view(header, shown),
-        events_view(shown),
-        active_tab=0,
-    )
-    left = (
-        rrb.Vertical(scene_view(header, shown, follow=follow), below, row_shares=[3, 2])
-        if ports
-        else below
-    )
+    states = [states_view(header, shown)] if ports or main_lanes(header) else []
+    below = rrb.Tabs(*states, events_view(shown), active_tab=0)
+    whole: Any = rrb.Vertical(right, below, row_shares=[5, 1])
+    if ports:
+        left = rrb.Vertical(scene_view(header, shown, follow=follow), below, row_shares=[3, 2])
+        whole = rrb.Horizontal(left, right, column_shares=[2, 3])
     panel = {"play_state": "following"} if live else {"play_state": "playing", "loop_mode": "all"}
     return rrb.Blueprint(
-        rrb.Horizontal(left, right, column_shares=[2, 3]),
+        whole,
         rrb.TimePanel(state="collapsed", timeline="t", **panel),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),

@@ -71,7 +71,7 @@ MOST_IN_LEGEND = 4
 its name."""
 MOST_IN_TAB = 6
 """More plots than this in one tab would be too low to read."""
-MOST_PLOTS = 5
+MOST_PLOTS = 6
 """Shown first of a graph without a robot."""
 FEET = "vertical force on each foot"
 OTHER = np.array([0xFFA726FF, 0xC0CA33FF, 0x26C6DAFF], np.uint32)
@@ -188,9 +188,8 @@ def _series(header: Header, line: PlotLine, label: str, *, other: bool) -> Any:
 def main_plots(header: Header, ports: ScenePorts | None, shown: Sequence[ShownRun]) -> list[Any]:
     """Return the plots that are shown first.
 
-    They show the robot's true, estimated and planned motion, forces and motors. For a graph without
-    a
-    robot they show its first fields."""
+    They show the robot's true, estimated and planned motion, forces and motors. For a graph without a
+    robot they show the first signals of its own blocks."""
     return [
         feet_plot(header, shown) if name == FEET else plot(header, name, lines, shown)
         for name, lines in main_lines(header, ports)
@@ -206,7 +205,8 @@ def main_lines(header: Header, ports: ScenePorts | None) -> list[tuple[str, list
     """Name and lines of each plot that is shown first; ``FEET`` has none of a field."""
     fields = {field.name: field for field in header.bus.fields if not field.constant}
     if ports is None:
-        return [(field.name, [PlotLine(field)]) for field in list(fields.values())[:MOST_PLOTS]]
+        own = [field for name, field in fields.items() if "~" not in name]
+        return [(field.name, [PlotLine(field)]) for field in own[:MOST_PLOTS]]
     pose = ports.pose.block
     velocity = next(
         (n for end in ("base_linear_velocity", "linear_velocity")

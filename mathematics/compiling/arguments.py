@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .failures import FAILURES
+from .failures import FAILURES, Failure
 from .machine_code import ENTRY, machine_code_of
 
 HEADER = 2
@@ -132,7 +132,7 @@ def error_record() -> NDArray[np.int64]:
     """Return the record with which machine code reports errors: whether one was reported, the status,
     the address of Python's function that sets an error, and those of the errors, by kind."""
     function = ctypes.cast(ctypes.pythonapi.PyErr_SetString, ctypes.c_void_p).value
-    kinds = [id(error) for error, _ in FAILURES.values()]
+    kinds = [id(FAILURES[failure][0]) for failure in Failure]
     return np.array([0, 0, function or 0, *kinds], np.int64)
 
 

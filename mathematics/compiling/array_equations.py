@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import ast
-import copy
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from .expressions import NUMBERS, indices_of, numbers, repeats, shown
+from .expressions import NUMBERS, cloned, indices_of, numbers, repeats, shown
 from .kinds import NUMBER, ArrayKind
 from .slices import Cut, Slices, called, minus, plus
 
@@ -95,7 +94,7 @@ class ArrayEquations(Slices):
                 same = ast.unparse(length) == ast.unparse(wanted)
                 if not same and not isinstance(length, ast.Constant):
                     function = ast.Attribute(ast.Name(NUMBERS, ast.Load()), "demand", ast.Load())
-                    test = ast.Call(function, [copy.deepcopy(length), copy.deepcopy(wanted)], [])
+                    test = ast.Call(function, [cloned(length), cloned(wanted)], [])
                     self._scope.setdefault(NUMBERS, numbers())  # type: ignore[attr-defined]  # a module's names
                     self._put_ahead(ast.Expr(test), node)
         elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult):
@@ -121,7 +120,7 @@ class ArrayEquations(Slices):
         return self._size_of(node.left, left.rank - 1) or self._size_of(node.right, 0)
 
     def _settled_target(self, target: ast.Subscript) -> ast.Subscript:
-        target = copy.deepcopy(target)
+        target = cloned(target)
         self._settle_indices(target)
         return target
 
@@ -165,10 +164,10 @@ class ArrayEquations(Slices):
     def _element_statement(
         self, target: ast.expr, value: ast.expr, places: list[ast.expr]
     ) -> ast.stmt:
-        written = self._part(copy.deepcopy(target), places)
+        written = self._part(cloned(target), places)
         assert isinstance(written, ast.Subscript)
         written.ctx = ast.Store()
-        return ast.Assign([written], self._element(copy.deepcopy(value), places))
+        return ast.Assign([written], self._element(cloned(value), places))
 
     def _element(self, node: ast.expr, places: list[ast.expr]) -> ast.expr:
         """Return the element of an expression at some places, or the number that it is."""
@@ -229,7 +228,7 @@ class ArrayEquations(Slices):
             left = (
                 node.left if simple or self._ahead is None else self._kept("base", node.left, node)
             )
-            return ast.copy_location(ast.BinOp(left, ast.Mult(), copy.deepcopy(left)), node)
+            return ast.copy_location(ast.BinOp(left, ast.Mult(), cloned(left)), node)
         return node
 
     def _is_conversion(self, node: ast.Call) -> bool:
@@ -237,7 +236,7 @@ class ArrayEquations(Slices):
 
     def _part(self, node: ast.expr, places: Sequence[ast.expr]) -> ast.expr:
         """Return the element of an array, or of a part of one, at some places."""
-        places = [copy.deepcopy(place) for place in places]
+        places = [cloned(place) for place in places]
         if isinstance(node, ast.Attribute) and node.attr == "T":
             return self._part(node.value, places[::-1])
         indices: list[ast.expr] = []
@@ -270,8 +269,8 @@ class ArrayEquations(Slices):
 
         def term(j: ast.expr) -> list[ast.stmt]:
             self._ahead = []
-            a = self._element(copy.deepcopy(node.left), [*places[:own], j])
-            b = self._element(copy.deepcopy(node.right), [j, *places[own:]])
+            a = self._element(cloned(node.left), [*places[:own], j])
+            b = self._element(cloned(node.right), [j, *places[own:]])
             product = ast.BinOp(a, ast.Mult(), b)
             return [*self._ahead, ast.AugAssign(ast.Name(total, ast.Store()), ast.Add(), product)]
 
@@ -308,9 +307,9 @@ class ArrayEquations(Slices):
                     a, b = (k + 1) % 3, (k + 2) % 3
                     terms = [
                         ast.BinOp(
-                            rewriter._element(copy.deepcopy(node.args[0]), [ast.Constant(i)]),
+                            rewriter._element(cloned(node.args[0]), [ast.Constant(i)]),
                             ast.Mult(),
-                            rewriter._element(copy.deepcopy(node.args[1]), [ast.Constant(j)]),
+                            rewriter._element(cloned(node.args[1]), [ast.Constant(j)]),
                         )
                         for i, j in ((a, b), (b, a))
                     ]
@@ -455,7 +454,7 @@ class ArrayEquations(Slices):
 
 def _place_in(bounds: Cut, place: ast.expr) -> ast.expr:
     """Return the index of place ``k`` of a slice."""
-    first = copy.deepcopy(bounds.first)
+    first = cloned(bounds.first)
     if bounds.step == 1:
         return plus(first, place)
     if isinstance(place, ast.Constant):

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from .array_equations import ArrayEquations
-from .expressions import NUMBERS, numbers
+from .expressions import NUMBERS, cloned, numbers
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind
 from .slices import called
 
@@ -199,7 +199,7 @@ class ArrayFunctions(ArrayEquations):
         if kind.shape == (0,) and "max" in name + "min":
             raise self._error(node, f"{ast.unparse(node)} of an array without elements")
         before, within = _TEXTS["sum" if name == "mean" else name]
-        value = self._settle(self._without_cross(copy.deepcopy(value)), "")
+        value = self._settle(self._without_cross(cloned(value)), "")
         sizes = [self._size_of(value, k) for k in range(kind.rank)]
         if any(size is None for size in sizes):
             raise self._error(node, f"the size of {ast.unparse(value)} is not known")
@@ -209,7 +209,7 @@ class ArrayFunctions(ArrayEquations):
 
         def written(text: str, places: list[ast.expr]) -> list[ast.stmt]:
             outer, self._ahead = self._ahead, []
-            element = self._element(copy.deepcopy(value), places)
+            element = self._element(cloned(value), places)
             ahead, self._ahead = self._ahead, outer
             return [*ahead, *_filled_in(text, names, element)]
 
@@ -226,7 +226,7 @@ class ArrayFunctions(ArrayEquations):
         total: ast.expr = ast.Name(names["total"], ast.Load())
         self._kinds[names["total"]] = NUMBER
         if name == "mean":
-            count = copy.deepcopy(sizes[0])
+            count = cloned(sizes[0])
             for size in sizes[1:]:
                 count = ast.BinOp(count, ast.Mult(), size)  # type: ignore[arg-type]  # known
             total = ast.BinOp(total, ast.Div(), count)  # type: ignore[arg-type]  # known
@@ -419,7 +419,7 @@ def _filled_in(text: str, names: dict[str, str], element: ast.expr | None = None
     class Names(ast.NodeTransformer):
         def visit_Name(self, node: ast.Name) -> ast.AST:
             if node.id in ("E", "FIRST") and element is not None:
-                return copy.deepcopy(element)
+                return cloned(element)
             return ast.Name(names.get(node.id, node.id), node.ctx)
 
     parsed = Names().visit(ast.parse(text)).body

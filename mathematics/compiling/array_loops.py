@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import ast
-import copy
 from collections.abc import Sequence
 from typing import Any
 
 from .array_functions import ArrayFunctions
+from .expressions import cloned
 from .kernel_registry import arguments_of, is_kernel
 from .kinds import NUMBER, ArrayKind, Kind
 from .slices import called, plus
@@ -100,7 +100,7 @@ class ArrayLoops(ArrayFunctions):
                 self._note(target, NUMBER)
         self._kinds[name] = NUMBER
         for target, source in streams:
-            part = ast.Subscript(copy.deepcopy(source), ast.Name(name, ast.Load()), ast.Load())
+            part = ast.Subscript(cloned(source), ast.Name(name, ast.Load()), ast.Load())
             for each in ast.walk(part):
                 if not hasattr(each, "lineno"):
                     ast.copy_location(each, node)
@@ -151,7 +151,7 @@ class ArrayLoops(ArrayFunctions):
         assert isinstance(kind, ArrayKind)
         whole = ast.Tuple([ast.Slice() for _ in kind.shape], ast.Load())
         written = ast.copy_location(ast.Subscript(target.value, whole, ast.Store()), node)
-        return self._loops(node, written, value, copy.deepcopy(mask))
+        return self._loops(node, written, value, cloned(mask))
 
     def _complete(self, node: ast.Call) -> None:
         """Put the arguments of a call of a kernel in their order, with those that are left out."""

@@ -15,7 +15,7 @@ from . import shipped, store
 from .arguments import ArgumentType, pack, type_of
 from .fingerprint import fingerprint
 from .kernel_call import KernelCall
-from .machine_code import MachineCode, tools
+from .machine_code import MachineCode, optimised, tools
 from .sharing import CompileJob, divide, helpers, processors
 from .translate import CompileError, Translator
 
@@ -95,31 +95,32 @@ class _Compilation:
         refused: list[str] = []
         if not missing:
             return refused
-        jobs = [
-            CompileJob(name, self._calls[k].kernel, self._types[k]) for name, k in missing.items()
-        ]
+        translator = Translator()
+        jobs: list[CompileJob] = []
+        for name, k in missing.items():
+            try:
+                assembly = translator.module(self._calls[k].kernel, self._types[k])
+                jobs.append(CompileJob(name, assembly))
+            except CompileError as error:
+                refused.append(str(error))
         own, *shares = divide(jobs, processors())
         others = [job for share in shares for job in share]
-        translator = Translator()
         with helpers(shares) as processes:
             for done, job in enumerate(own):
                 _tell(done + _finished(others), len(jobs))
-                self._translate(job, translator, refused)
+                self._optimise(job)
             for process in processes:
                 _wait(process, len(own), others)
         for job in others:
             if not self._load(job.name, store.load(job.name)):
-                self._translate(job, translator, refused)
+                self._optimise(job)
         _tell(len(jobs), len(jobs))
         return refused
 
-    def _translate(self, job: CompileJob, translator: Translator, refused: list[str]) -> None:
-        try:
-            code = translator.object_code(job.kernel, job.signature)
-            _loaded[job.name] = MachineCode(code)
-            store.save(job.name, code)
-        except CompileError as error:
-            refused.append(str(error))
+    def _optimise(self, job: CompileJob) -> None:
+        code = optimised(job.assembly)
+        _loaded[job.name] = MachineCode(code)
+        store.save(job.name, code)
 
 
 def _tell(done: int, total: int) -> None:

@@ -19,7 +19,6 @@ number of Python (which is faster there), and a member of an ``IntEnum`` becomes
 from __future__ import annotations
 
 import ast
-import copy
 import linecache
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -29,8 +28,8 @@ from typing import Any
 
 from .array_loops import ArrayLoops
 from .expressions import EquationError as EquationError  # noqa: PLC0414  also imported from here
+from .expressions import cloned, indices_of, shown
 from .expressions import cross as cross  # noqa: PLC0414
-from .expressions import indices_of, shown
 from .kernel_registry import is_kernel, written_code
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kinds
 from .slices import Cut, counters_of
@@ -197,9 +196,7 @@ class _Rewriter(ArrayLoops):
             node.body, node.orelse = self.body(node.body), self.body(node.orelse)
             self._depth -= 1
             return [node]
-        kept = (
-            copy.deepcopy(node) if isinstance(node, ast.Assign | ast.AugAssign | ast.Expr) else None
-        )
+        kept = cloned(node) if isinstance(node, ast.Assign | ast.AugAssign | ast.Expr) else None
         for field, value in ast.iter_fields(node):
             if isinstance(value, ast.expr) and field not in ("target", "annotation"):
                 setattr(node, field, self._canonical(value))
@@ -279,7 +276,7 @@ class _Rewriter(ArrayLoops):
             else:
                 value = self._kept("number", self._expression(value), node)
         for target in node.targets:
-            plain = ast.copy_location(ast.Assign([target], copy.deepcopy(value)), node)
+            plain = ast.copy_location(ast.Assign([target], cloned(value)), node)
             made += self._assign(plain, target)
         return made
 
@@ -354,7 +351,7 @@ class _Rewriter(ArrayLoops):
             assert isinstance(node.target, ast.Subscript)
             mask = self._canonical(mask)
             sum_ = ast.copy_location(
-                ast.BinOp(_loaded(copy.deepcopy(node.target)), node.op, node.value), node
+                ast.BinOp(_loaded(cloned(node.target)), node.op, node.value), node
             )
             return self._masked(node, node.target, mask, sum_)
         if isinstance(node.target, ast.Name | ast.Attribute | ast.Subscript) and self._is_array(
@@ -367,13 +364,13 @@ class _Rewriter(ArrayLoops):
                 base = target.value if isinstance(target, ast.Subscript) else _loaded(target)
                 whole = ast.Tuple([*own, *[ast.Slice() for _ in kind.shape]], ast.Load())
                 target = ast.copy_location(ast.Subscript(base, whole, ast.Store()), node)
-            left = copy.deepcopy(target)
+            left = cloned(target)
             sum_ = ast.copy_location(ast.BinOp(_loaded(left), node.op, node.value), node)
             return self._loops(node, target, sum_)
         node.value = self._expression(node.value)
         element = self._element_type(node.target)
         if element is not None and not isinstance(node.target, ast.Name):
-            read = self._expression(_loaded(copy.deepcopy(node.target)))
+            read = self._expression(_loaded(cloned(node.target)))
             value = ast.BinOp(read, node.op, node.value)
             plain: ast.stmt = ast.Assign([self._target(node.target)], value)
             return [ast.copy_location(plain, node)]

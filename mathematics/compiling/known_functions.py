@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -80,7 +81,9 @@ def _extreme(comparison: str) -> Translation:
             kind = join(kind, each.type)
         found, *others = (code.convert(each, kind) for each in arguments)
         for other in others:
+            counts = comparison == "Gt" and (found.counts or other.counts)
             found = code.select(code.compare(comparison, other, found), other, found)
+            found = replace(found, counts=found.counts or counts)
         return found
 
     return write

@@ -249,17 +249,18 @@ def _linker() -> Any:
 _numbers = count()
 
 
-def machine_code_of(module: Any) -> MachineCode:
+def machine_code_of(module: Any, *, optimise: bool = False) -> MachineCode:
     """Return the function ``ENTRY`` of a module in LLVM's language, from the cache or made now; it
     stays in memory.
 
-    Such modules do what kernels cannot: call functions by their addresses.
+    Such modules do what kernels cannot: call functions by their addresses, jump to one of many places.
     """
     text = str(module)
-    name = hashlib.blake2b(f"{tools()}|{text}".encode(), digest_size=16).hexdigest()
+    make = optimised if optimise else assemble
+    name = hashlib.blake2b(f"{tools()}|{make.__name__}|{text}".encode(), digest_size=16).hexdigest()
     kept = store.load(name)
     if kept is None:
-        kept = assemble(text)
+        kept = make(text)
         store.save(name, kept)
     code = MachineCode(kept)
     _alive.append(code)

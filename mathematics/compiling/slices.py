@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import ast
-import copy
 from collections.abc import Callable
 from enum import IntEnum
 
-from .expressions import Expressions, indices_of
+from .expressions import Expressions, cloned, indices_of
 from .kinds import ArrayKind, GreatestLength, RuntimeSize
 
 
@@ -25,10 +24,6 @@ class Cut(ast.expr):
     ) -> None:
         super().__init__()
         self.first, self.step, self.length, self.most = first, step, length, most
-
-    def __deepcopy__(self, memo: object) -> Cut:
-        made = Cut(copy.deepcopy(self.first), self.step, copy.deepcopy(self.length), self.most)
-        return ast.copy_location(made, self)
 
 
 class Slices(Expressions):
@@ -80,7 +75,7 @@ class Slices(Expressions):
         key = f"{ast.dump(part)} {ast.dump(node.value)} {dimension}"
         if key not in self._cuts:
             self._cuts[key] = self._new_cut(part, size, node, dimension)
-        return copy.deepcopy(self._cuts[key])
+        return cloned(self._cuts[key])
 
     _cuts: dict[str, Cut]
     """The slices of the present statement, so that equal ones have bounds of one name."""
@@ -105,6 +100,10 @@ class Slices(Expressions):
             bounds = (
                 self._simple_cut(part, lower, upper, node, dimension) if step == 1 else None
             ) or self._general_cut(part, step, node, dimension)
+            if not (isinstance(bounds.first, ast.Constant) and bounds.first.value == 0):
+                bounds.length = called(
+                    "max", bounds.length, ast.Constant(0)
+                )  # one may begin beyond
             most = self._length_of(part, size)
             bounds.most = None if most is None else int(most)
         for each in ast.walk(bounds):
@@ -124,17 +123,17 @@ class Slices(Expressions):
         if whole is None:
             raise self._error(node, "say where this slice ends")
         if part.upper is None or (upper is not None and upper < 0):
-            back = first if upper is None else plus(copy.deepcopy(first), ast.Constant(-upper))
-            length = minus(whole, copy.deepcopy(back))
+            back = first if upper is None else plus(cloned(first), ast.Constant(-upper))
+            length = minus(whole, cloned(back))
         elif self._is_count(part.upper):
             last = called("min", self._bound(part.upper, upper), whole)
-            length = minus(last, copy.deepcopy(first))
+            length = minus(last, cloned(first))
         else:
             return None
         return Cut(first, 1, length)
 
     def _bound(self, node: ast.expr, constant: int | None) -> ast.expr:
-        return self._expression(copy.deepcopy(node)) if constant is None else ast.Constant(constant)
+        return self._expression(cloned(node)) if constant is None else ast.Constant(constant)
 
     def _general_cut(self, part: ast.Slice, step: int, node: ast.Subscript, dimension: int) -> Cut:
         """Find the places of any slice, by the statements of ``slice.indices``."""
@@ -155,16 +154,16 @@ class Slices(Expressions):
                 continue
             place = self._kept("bound", self._bound(bound, self._constant_of(bound)), node)
             moved = ast.IfExp(
-                ast.Compare(place, [ast.Lt()], [ast.Constant(0)]), plus(place, copy.deepcopy(whole)), place
+                ast.Compare(place, [ast.Lt()], [ast.Constant(0)]), plus(place, cloned(whole)), place
             )  # fmt: skip
-            limited = called("max", copy.deepcopy(least), called("min", moved, copy.deepcopy(most)))
+            limited = called("max", cloned(least), called("min", moved, cloned(most)))
             ends.append(self._kept("bound", limited, node))
-        first, last = (copy.deepcopy(each) for each in ends)
+        first, last = (cloned(each) for each in ends)
         span = minus(last, first) if step > 0 else minus(first, last)
         if abs(step) > 1:
             up = plus(span, ast.Constant(abs(step) - 1))
             span = ast.BinOp(up, ast.FloorDiv(), ast.Constant(abs(step)))
-        return Cut(copy.deepcopy(first), step, span)
+        return Cut(cloned(first), step, span)
 
     def _length_of(self, part: ast.expr, size: int | None) -> int | None:
         """Return the length of a slice where it is known."""

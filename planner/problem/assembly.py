@@ -79,11 +79,6 @@ class Assembly:
                 self.parameters += size
         self._place()
 
-    @property
-    def interpreted(self) -> bool:
-        """True if CasADi's virtual machine evaluates the pieces."""
-        return any(piece.value.class_name() != "External" for piece in self.pieces.values())
-
     @cached_property
     def signature(self) -> tuple[object, ...]:
         """Equal for problems of the same structure and functions."""

@@ -492,13 +492,10 @@ def derived(
     hessian, slope = lift.hessian(lam_f * cost + ca.dot(lam_g, rows), z)
     jacobian, gradient = lift.jacobian(rows, z), ca.densify(lift.jacobian(cost, z).T)
     cost, rows = lift.put_back([cost, ca.densify(rows)])
-    options = {"cse": True}
     return StageFunction(
-        ca.Function(f"{prefix}_value", [z, w], [cost, rows], options),
-        ca.Function(f"{prefix}_jacobian", [z, w], [rows, gradient, jacobian], options),
-        ca.Function(
-            f"{prefix}_hessian", [z, w, lam_f, lam_g], [ca.densify(slope), hessian], options
-        ),
+        ca.Function(f"{prefix}_value", [z, w], [cost, rows]),
+        ca.Function(f"{prefix}_jacobian", [z, w], [rows, gradient, jacobian]),
+        ca.Function(f"{prefix}_hessian", [z, w, lam_f, lam_g], [ca.densify(slope), hessian]),
     )
 
 

@@ -49,7 +49,6 @@ def statistics_of(problem: SimpleProblem, solution: Solution) -> dict[str, Any]:
         "knots": problem.knots,
         "variables": problem.assembly.variables,
         "constraints": problem.assembly.constraints,
-        "compiled": not problem.assembly.interpreted,
     }
 
 

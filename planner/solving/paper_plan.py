@@ -16,7 +16,7 @@ from ..problem.program import SimpleProblem
 from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.task import JumpTask
-from .compilation import FunctionSet, Progress, SolveOptions, load_functions
+from .kept_functions import FunctionSet, Progress, SolveOptions, load_functions
 from .outcome import failure, motion_arrays, statistics_of, versions
 from .solver import solve
 from .solver_process import cpu_time
@@ -33,7 +33,6 @@ def paper_problem(
     task: JumpTask,
     robot: RobotDescription,
     *,
-    compiled: bool = True,
     progress: Progress | None = None,
 ) -> SimpleProblem:
     """Return the paper's problem of a task.
@@ -45,7 +44,7 @@ def paper_problem(
     functions = FunctionSet(
         stages.NAME, stages.PIECES, stages.SOURCES, lambda name: stages.make_piece(model, name)
     )
-    pieces = load_functions(functions, model, compiled=compiled, progress=progress)
+    pieces = load_functions(functions, model, progress=progress)
     stances = stances_of(task, robot, finder)
     return PaperProblemBuilder(task, model, pieces, stances[0], stances[-1]).build()
 
@@ -62,7 +61,7 @@ def solve_paper(task: JumpTask, robot: RobotDescription, options: SolveOptions) 
     started = cpu_time()
     if options.knots is not None:
         task = task.model_copy(update={"knots": options.knots})
-    problem = paper_problem(task, robot, compiled=options.compiled, progress=options.progress)
+    problem = paper_problem(task, robot, progress=options.progress)
     tries = [options.solver] if options.solver else ["ipopt", "fatrop"]
     starts = [(name, problem.guess, False) for name in tries]
     if options.warm_start is not None and options.warm_start.touchdown_time > 0.0:
@@ -103,7 +102,7 @@ def in_steps(
     values: Array | None = None
     for share in STEPS:
         way = task.model_copy(update={name: share * value for name, value in asked.items()})
-        near = paper_problem(way, robot, compiled=options.compiled, progress=options.progress)
+        near = paper_problem(way, robot, progress=options.progress)
         guess = near.guess if values is None else np.clip(values, near.lower, near.upper)
         found = solve(
             near, guess, warm=values is not None, barrier=WARM_BARRIER, solver=solver, limit=LIMIT

@@ -29,7 +29,7 @@ from ..task.files import PlanError
 from ..task.phase import Phase
 from ..task.plan import PlannedJump
 from ..task.task import JumpTask
-from .compilation import FunctionSet, Progress, SolveOptions, load_functions
+from .kept_functions import FunctionSet, Progress, SolveOptions, load_functions
 from .outcome import failure, motion_arrays, statistics_of, versions
 from .solver import solve
 from .solver_process import cpu_time
@@ -183,7 +183,6 @@ def rigid_body_problem(
     task: JumpTask,
     robot: RobotDescription,
     *,
-    compiled: bool = True,
     progress: Progress | None = None,
 ) -> tuple[SimpleProblem, RigidBody]:
     """Return the single rigid body's problem of a task, and the body.
@@ -195,7 +194,7 @@ def rigid_body_problem(
     functions = FunctionSet(
         stages.NAME, stages.PIECES, stages.SOURCES, lambda name: stages.make_piece(model, name)
     )
-    pieces = load_functions(functions, model, compiled=compiled, progress=progress)
+    pieces = load_functions(functions, model, progress=progress)
     stances = stances_of(task, robot, finder)
     body = composite_inertia(model.robot, stances[0])
     builder = RigidBodyProblemBuilder(task, model, pieces, body, stances[0], stances[-1])
@@ -211,9 +210,7 @@ def solve_rigid_body(task: JumpTask, robot: RobotDescription, options: SolveOpti
     started = cpu_time()
     if options.knots is not None:
         task = task.model_copy(update={"knots": options.knots})
-    problem, body = rigid_body_problem(
-        task, robot, compiled=options.compiled, progress=options.progress
-    )
+    problem, body = rigid_body_problem(task, robot, progress=options.progress)
     solution = solve(problem, problem.guess, solver=options.solver)
     if not solution.solved:
         raise failure(task, solution)

@@ -42,7 +42,7 @@ from ..task.plan import ARRAYS, PlannedJump
 from ..task.recipe import choices
 from ..task.sequence import PHASES, Hop
 from ..task.task import JumpTask, Knots
-from .compilation import Progress, SolveOptions, load_pieces
+from .kept_functions import Progress, SolveOptions, load_pieces
 from .outcome import failure, for_all_joints, for_moving_joints, versions
 from .paper_plan import solve_paper
 from .rigid_body_plan import solve_rigid_body
@@ -188,7 +188,6 @@ def solve_jump(
     *,
     warm_start: PlannedJump | None = None,
     progress: Progress | None = None,
-    compiled: bool = True,
     solver: str = "",
     knots: Knots | None = None,
     quick: bool = False,
@@ -218,7 +217,7 @@ def solve_jump(
     model_of(robot)  # raises what is wrong with the robot itself
     part = welded(robot)
     start = warm_start and for_moving_joints(warm_start, part)
-    options = SolveOptions(start, progress, compiled, solver, knots, quick)
+    options = SolveOptions(start, progress, solver, knots, quick)
     plan = FORMULATIONS[task.formulation](task, robot, options)
     plan = replace(plan, statistics={**plan.statistics, "chosen": chosen})
     return for_all_joints(plan, part, robot)
@@ -233,7 +232,7 @@ def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -
         again = warm_start is not None and asks_for_finer(task, warm_start)
         knots = finer_knots(warm_start) if again and warm_start is not None else task.knots
     gridded = with_knots(task, knots)
-    problem = make_problem(gridded, robot, compiled=options.compiled, progress=options.progress)
+    problem = make_problem(gridded, robot, progress=options.progress)
     guess = ballistic_guess(problem)
     solution, warm = None, False
     if warm_start is not None and _leaves_plane(problem, warm_start) and options.quick:
@@ -281,7 +280,6 @@ def solve_full(task: JumpTask, robot: RobotDescription, options: SolveOptions) -
         "coordinates": problem.coordinates.name,
         "variables": problem.assembly.variables,
         "constraints": problem.assembly.constraints,
-        "compiled": not problem.assembly.interpreted,
     }
     return PlannedJump(
         task=task, statistics=statistics, versions=versions(), **unpack(problem, solution.values)
@@ -304,7 +302,6 @@ def make_problem(
     task: JumpTask,
     robot: RobotDescription,
     *,
-    compiled: bool = True,
     progress: Progress | None = None,
     coordinates: str = "",
 ) -> FullProblem:
@@ -315,7 +312,7 @@ def make_problem(
 
     Raises ``PlanError`` and ``JumpTaskError`` as ``solve_jump`` does.
     """
-    builder = _builder(task, robot, compiled, progress, coordinates)
+    builder = _builder(task, robot, progress, coordinates)
     return builder.build()
 
 
@@ -327,7 +324,7 @@ def problems_like(
 
     Raises ``PlanError`` and ``JumpTaskError`` as ``solve_jump`` does.
     """
-    builder, robot = _builder(task, robot, True, None, coordinates), task.equipped(robot)
+    builder, robot = _builder(task, robot, None, coordinates), task.equipped(robot)
     builder.build()
     mirrored = builder.coordinates.name != "full"
     finder = (symmetric_model_of if mirrored else model_of)(robot)[1]
@@ -335,7 +332,7 @@ def problems_like(
 
 
 def _builder(
-    task: JumpTask, robot: RobotDescription, compiled: bool, progress: Progress | None, coordinates: str,
+    task: JumpTask, robot: RobotDescription, progress: Progress | None, coordinates: str,
     *, twin: bool = False,
 ) -> ProblemBuilder:  # fmt: skip
     """Return the builder of ``make_problem``; ``twin`` takes the robot's mirrored twin where it is not the same left
@@ -359,8 +356,8 @@ def _builder(
         chosen = _coordinates(exact, "full")
     free = any(problem_phase.timed and not problem_phase.flies for problem_phase in problem_phases)
     if free and chosen.name == "full" and not coordinates:
-        given = with_ground_times(task, robot, compiled=compiled, progress=progress)
-        return _builder(given, robot, compiled, progress, "")
+        given = with_ground_times(task, robot, progress=progress)
+        return _builder(given, robot, progress, "")
     used = {
         "contact",
         "take_off",
@@ -371,7 +368,7 @@ def _builder(
     names = tuple(name for name in PIECES if name in used)
     if task.leans:
         names = tuple(SLOPED + name if name in SLOPED_PIECES else name for name in names)
-    loaded = load_pieces(model, chosen, names=names, compiled=compiled, progress=progress)
+    loaded = load_pieces(model, chosen, names=names, progress=progress)
     pieces = {name.removeprefix(SLOPED): piece for name, piece in loaded.items()}
     return ProblemBuilder(task, model, chosen, pieces, stances, exact)
 
@@ -401,7 +398,7 @@ def _choose(
 
 
 def with_ground_times(
-    task: JumpTask, robot: RobotDescription, *, compiled: bool = True,
+    task: JumpTask, robot: RobotDescription, *,
     progress: Progress | None = None,
 ) -> JumpTask:  # fmt: skip
     """Return the task with all times on the ground given: those that are free are found for the same jumps straight
@@ -410,8 +407,8 @@ def with_ground_times(
     times = [USUAL_TIMES.get(PHASES[phase_spec.phase], 0.0) for phase_spec in task.phase_specs()]
     straight = straight_ahead(task).model_copy(update={"impact": False})
     usual = with_times(straight, times)
-    if make_problem(usual, robot, compiled=compiled, progress=progress).coordinates.name != "full":
-        problem = make_problem(straight, robot, compiled=compiled, progress=progress)
+    if make_problem(usual, robot, progress=progress).coordinates.name != "full":
+        problem = make_problem(straight, robot, progress=progress)
         solution = solve(problem, ballistic_guess(problem), solver="fatrop")
         if solution.solved:
             knots = knot_times(problem, solution.values)
@@ -484,8 +481,7 @@ def _displaced(problem: FullProblem, robot: RobotDescription) -> Array | None:
     for task, mirrored in ((straight, twin), (in_place(problem.task), False)):
         if task == problem.task and not mirrored:
             continue
-        compiled = not problem.assembly.interpreted
-        simpler = _builder(task, robot, compiled, None, "", twin=mirrored).build()
+        simpler = _builder(task, robot, None, "", twin=mirrored).build()
         if task == problem.task and simpler.coordinates.name == "full":
             continue  # the twin does not stand the same left and right
         solution = solve(simpler, ballistic_guess(simpler), solver="fatrop")
@@ -502,7 +498,7 @@ def _turning(problem: FullProblem, robot: RobotDescription, guess: Array) -> Sol
     if found is not None or not problem.task.impact:
         return found
     task = problem.task.model_copy(update={"impact": False})
-    gentle = make_problem(task, robot, compiled=not problem.assembly.interpreted)
+    gentle = make_problem(task, robot)
     for relaxation in RELAXATIONS:
         first = solve(relaxed(gentle, relaxation), ballistic_guess(gentle), solver="fatrop")
         if not first.solved:

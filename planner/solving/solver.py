@@ -6,6 +6,7 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -89,23 +90,22 @@ def _run(
     problem: NonlinearProgram, guess: Array, name: str, barrier: float, limit: int
 ) -> Solution:
     started = cpu_time()
-    function, evaluate, constraint = _solver(problem.assembly, name, barrier, limit)
-
+    solver = _solver(problem.assembly, name, barrier, limit)
     arguments = {
         "x0": guess, "p": problem.parameters, "lbx": problem.lower, "ubx": problem.upper,
         "lbg": problem.row_lower, "ubg": problem.row_upper,
     }  # fmt: skip
     # In a copy of a process: a fatrop that has failed once would fail at easy problems later.
     if name == "fatrop":
-        ended, answer = call_bounded(function, arguments, time_limit(problem.assembly, limit))
+        ended, answer = call_bounded(solver, arguments, time_limit(problem.assembly, limit))
         if not ended or answer is None:
             spent = cpu_time() - started
             return Solution(guess, name, 0, np.inf, np.inf, "dynamics", False, spent)
         values, stats = answer
     else:
-        values, stats = call_solver(function, arguments)
-    cost = float(evaluate(values, problem.parameters)) if np.isfinite(values).all() else np.inf
-    violation, family = violation_of(problem, values, constraint)
+        values, stats = call_solver(solver, arguments)
+    cost = float(solver.cost(values, problem.parameters)) if np.isfinite(values).all() else np.inf
+    violation, family = violation_of(problem, values, solver.constraints)
     status = str(stats.get("unified_return_status", ""))
     solved = bool(stats["success"]) or status == "SOLVER_RET_SUCCESS"
     solved = solved and violation <= 2.0 * VIOLATION
@@ -133,26 +133,59 @@ def violation_of(problem: NonlinearProgram, values: Array, constraint: Any) -> t
     return max(float(over[worst]), 0.0), problem.families[worst]
 
 
-_solvers: OrderedDict[object, tuple[Any, Any, Any]] = OrderedDict()
+class Solver:
+    """A solver of CasADi for problems of one structure. Pickled, it is made anew where it arrives: CasADi cannot write
+    down functions that call Python.
+
+    Attributes:
+        cost, constraints: the functions of variables and parameters.
+    """
+
+    def __init__(self, assembly: Assembly, name: str, barrier: float, limit: int) -> None:
+        self._made_of = (assembly, name, barrier, limit)
+        self._functions = assembly.functions(upper=name != "fatrop")
+        self.cost, self.constraints = self._functions["nlp_f"], self._functions["nlp_g"]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what it is made of."""
+        return Solver, self._made_of
+
+    @cached_property
+    def _function(self) -> Any:
+        """CasADi's solver, which takes a second to make: only where it is called."""
+        assembly, name, barrier, limit = self._made_of
+        return _make_solver(assembly, self._functions, name, barrier, limit)
+
+    def __call__(self, **arguments: Array) -> Any:
+        """Solve, with the arguments of CasADi's solvers."""
+        return self._function(**arguments)
+
+    def stats(self) -> Any:
+        """Return CasADi's report of the last call."""
+        return self._function.stats()
 
 
-def _solver(assembly: Assembly, name: str, barrier: float, limit: int) -> tuple[Any, Any, Any]:
-    """Return a solver for problems of this structure, with the functions of cost and constraints."""
+_solvers: OrderedDict[object, Solver] = OrderedDict()
+
+
+def _solver(assembly: Assembly, name: str, barrier: float, limit: int) -> Solver:
+    """Return a solver for problems of this structure."""
     key = (assembly.signature, name, barrier, limit)
     if key in _solvers:
         _solvers.move_to_end(key)
         return _solvers[key]
-    made = _make_solver(assembly, name, barrier, limit)
+    made = Solver(assembly, name, barrier, limit)
     _solvers[key] = made
     if len(_solvers) > KEPT:
         _solvers.popitem(last=False)
     return made
 
 
-def _make_solver(assembly: Assembly, name: str, barrier: float, limit: int) -> tuple[Any, Any, Any]:
+def _make_solver(
+    assembly: Assembly, functions: dict[str, Any], name: str, barrier: float, limit: int
+) -> Any:
     import casadi as ca
 
-    functions = assembly.functions(upper=name != "fatrop")
     nlp = {key: functions[key] for key in ("x", "p", "f", "g")}
     own: dict[str, Any] = {"tol": DUAL_TOLERANCE, "constr_viol_tol": VIOLATION,
                               "max_iter": limit, "print_level": 0}  # fmt: skip
@@ -179,5 +212,4 @@ def _make_solver(assembly: Assembly, name: str, barrier: float, limit: int) -> t
             "grad_f": functions["grad_f"], "no_nlp_grad": True, "ipopt": own,
         }  # fmt: skip
     with without_output():
-        made = ca.nlpsol("jump", name, nlp, options)
-    return made, functions["nlp_f"], functions["nlp_g"]
+        return ca.nlpsol("jump", name, nlp, options)

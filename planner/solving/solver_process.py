@@ -169,7 +169,7 @@ class _Helper:
         if number in self._sent:  # kept here as well, so nothing else can have its number
             self._sent.move_to_end(number)
         else:
-            data = function.serialize()
+            data = pickle.dumps(function)
             self._sent[number] = function
             if len(self._sent) > KEPT:
                 dropped.append(self._sent.popitem(last=False)[0])
@@ -204,8 +204,6 @@ _helper = _Helper()
 
 def serve() -> None:
     """Answer calls until the process's input ends."""
-    import casadi as ca
-
     requests: IO[bytes] = os.fdopen(os.dup(0), "rb")
     answers: IO[bytes] = os.fdopen(os.dup(1), "wb")
     kept: dict[int, Any] = {}
@@ -216,7 +214,7 @@ def serve() -> None:
             for old in dropped:
                 kept.pop(old, None)
             if data is not None:
-                kept[number] = ca.Function.deserialize(data)
+                kept[number] = pickle.loads(data)
             function, ended, error, answer = kept[number], True, "", None
             try:
                 ended, answer = _bounded_call(function, arguments, limit)

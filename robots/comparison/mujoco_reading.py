@@ -273,7 +273,11 @@ def _compare_joints(ours: FileRobot, state: _State, found: Differences) -> None:
         found.compare(f"axis of joint {name}", joint["axis"], axes[k])
         if model.jnt_limited[j] and joint["limits"] is not None:
             found.compare(f"range of joint {name}", joint["limits"], model.jnt_range[j])
-        elif model.jnt_limited[j] != (joint["limits"] is not None):
+        elif joint["limits"] is not None:
+            found.name(
+                "a joint of a URDF with one limit has zero as the other, where MuJoCo leaves both out"
+            )
+        elif model.jnt_limited[j]:
             found.name("a joint of a URDF without lower and upper limit turns freely")
         dof = int(model.jnt_dofadr[j])
         forces = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -25,7 +26,7 @@ def compare_with_pinocchio(ours: FileRobot) -> Differences:
     import pinocchio as pin
 
     found, built = Differences("Pinocchio"), ours.built
-    text = XmlFile(ours.model.path).content
+    text = _with_limits(XmlFile(ours.model.path))
     floats = built.base_joint == "floating"
     try:
         # A planar or fixed base by the user's wish is fixed in both.
@@ -49,6 +50,19 @@ def compare_with_pinocchio(ours: FileRobot) -> Differences:
         return found
     _compare_dynamics(ours, theirs, ids, found)
     return found
+
+
+def _with_limits(file: XmlFile) -> str:
+    """Return the file with a ``<limit>`` for joints that lack one. Pinocchio's parser refuses the whole file without, and prints
+    why on its own."""
+    bare = [
+        joint
+        for joint in file.root.findall("joint")
+        if joint.get("type") in ("revolute", "prismatic") and joint.find("limit") is None
+    ]
+    for joint in bare:
+        ElementTree.SubElement(joint, "limit", effort="0", velocity="0")
+    return ElementTree.tostring(file.root, encoding="unicode") if bare else file.content
 
 
 def _compare_joints(ours: FileRobot, theirs: Any, ids: list[int], found: Differences) -> None:

@@ -261,6 +261,17 @@ def _base_of(model: RawModel, wanted: str) -> tuple[str, str, list[str]]:
     return GROUND, wanted or "fixed", []
 
 
+def bolted(model: RawModel, base_joint: str) -> list[str]:
+    """Return a note of an MJCF body that carries two limbs or more and no joint holds: its free joint may be lost."""
+    roots = [body for body in model.bodies.values() if body.parent == model.world]
+    if model.is_urdf or base_joint != "fixed" or len(roots) != 1 or roots[0].joints:
+        return []
+    limbs = [body for body in model.bodies.values() if body.parent == roots[0].name and body.joints]
+    if len(limbs) < 2:
+        return []
+    return [f"{roots[0].name} has no free joint, so it is bolted to the world"]
+
+
 def _is_planar(body: RawBody) -> bool:
     """Check whether a body is carried by slides along x and z and a hinge about y, without motors."""
     kinds = sorted(

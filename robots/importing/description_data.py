@@ -29,7 +29,7 @@ from ..robot_description import SLIDE_UNITS, Joint, Link, RobotDescription
 from ..validation import DescriptionError, RobotError, find_errors
 from ..validation.errors import nearest
 from ..validation.find_errors import shown
-from .build import BodyFrame, LinkTree, build, tidy
+from .build import BodyFrame, LinkTree, bolted, build, tidy
 from .looks import link_looks
 from .odd_bodies import odd_bodies
 from .raw_model import RawJoint, RawModel
@@ -296,6 +296,9 @@ def rated_profile(
         for names, unit in ((turning, hinge), (slides, SLIDE_UNITS[hinge])):
             if names:
                 notes.append(f"no {what} limit of {listing(names, 6)}: {value:g} {unit} is assumed")
+    passive = [name for name, joint in joints.items() if not is_urdf and joint.effort == 0.0]
+    if passive:
+        notes.append(f"no actuator moves {listing(passive, 6)}")
     driven = [value for value in values.values() if value["peak_torque"] > 0] or [
         {**dict.fromkeys(KEYS, 0.0), "peak_torque": EFFORT, "continuous_torque": EFFORT,
          "corner_speed": CORNER * SPEED, "no_load_speed": SPEED}
@@ -437,6 +440,8 @@ def import_robot(path: Path, added: Mapping[str, Any], model: RawModel | None = 
     base_joint = added.get("base_joint", "")
     built = build(model, welded, base_joint if isinstance(base_joint, str) else "")
     notes += built.notes
+    if not base_joint:
+        notes += bolted(model, built.base_joint)
     unchanged = replace(
         built, links=[{**link} for link in built.links], joints=[{**each} for each in built.joints]
     )

@@ -137,6 +137,26 @@ def _is_possible(mass: float, tensor: Array) -> bool:
     return bool(mass > 1e-14 and least > 1e-14 and least + middle >= most)
 
 
+ROUNDED = 1e-2
+"""Share by which principal moments of published files are wrong through rounding."""
+SMALL = 1e-5
+"""kg m^2; smaller moments of a part, such as the ones of a frame that many files have, change no robot."""
+
+
+def impossible_parts(model: Any, written: Written) -> list[str]:
+    """Return the bodies that no joint moves and whose inertia no body has, such as one moment above the sum of the
+    others. No rule of descriptions finds them, as the body that they are part of may well have its inertia."""
+    found = []
+    for name, (_, tensor) in written.items():
+        if model.body(name).jntnum[0] or not np.any(tensor):
+            continue
+        least, middle, most = np.linalg.eigvalsh(tensor)
+        wrong = least < -ROUNDED * most or most > (1.0 + ROUNDED) * (least + middle)
+        if wrong and most > SMALL:
+            found.append(name)
+    return found
+
+
 def body_inertial(model: Any, k: int, written: tuple[float, Array] | None) -> Inertial:
     """Return a body of a compiled model in its own frame; ``written`` takes the place of mass and tensor."""
     import mujoco

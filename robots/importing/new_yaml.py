@@ -154,8 +154,15 @@ def _lowest(model: RawModel, built: LinkTree, link: str) -> float:
     return float(min(found))
 
 
+def _place(frame: BodyFrame) -> tuple[float, ...]:
+    """Return what a link's bodies are sorted by: the lowest first, of these the foremost, then the innermost. So both legs have
+    their foot on the same place, in whatever order the file has its bodies."""
+    x, y, z = frame.position.tolist()
+    return round(z, 3), -round(x, 3), abs(round(y, 3))
+
+
 def _foot(model: RawModel, built: LinkTree, link: str) -> dict[str, Any]:
-    bodies = _bodies(built, link)
+    bodies = dict(sorted(_bodies(built, link).items(), key=lambda each: _place(each[1])))
     bottom = _lowest(model, built, link) - _origins(built)[link][2]
     balls = []
     for name, frame in bodies.items():
@@ -166,7 +173,7 @@ def _foot(model: RawModel, built: LinkTree, link: str) -> dict[str, Any]:
             if is_ball and frame.position[2] + shape.lowest(frame.rotation) < bottom + LEVEL:
                 balls.append((name, frame, 0.5 * (shape.start + shape.end), shape.radius))
     if not balls:
-        name = min(bodies, key=lambda body: float(bodies[body].position[2]))
+        name = next(iter(bodies))
         points = _sole(model, built, link, bottom, bodies[name])
         if points:
             return {"name": name, "at": name, "radius": SOLE_RADIUS, "points": points}

@@ -23,6 +23,7 @@ from .hulls import RawShape, of_points
 from .inertials import (
     chosen,
     compile_reference,
+    impossible_parts,
     mujoco_remarks,
     one_line,
     replace_inertials,
@@ -63,6 +64,10 @@ def read_model(path: Path) -> RawModel:
     if file.is_urdf:
         check_urdf(file)
     notes, remarks = list[str](), list[str]()
+    if file.hangs_from_world:
+        notes.append(
+            "a joint hangs from the link world, which the URDF does not declare: it is the ground, as in Drake"
+        )
     with mujoco_remarks(remarks):
         spec, untouched = _parsed(file), _parsed(file)
     _refuse_closed_loops(spec, file)
@@ -98,6 +103,10 @@ def read_model(path: Path) -> RawModel:
         if joint.range == "free":
             notes.append(
                 f"joint {name} has no lower and upper limit in the URDF and turns freely here"
+            )
+        if joint.half is not None:
+            notes.append(
+                f"joint {name} has one limit in the URDF; the other is zero, as in the format: {joint.half[0]:g} to {joint.half[1]:g}"
             )
     for name, joint in limits.items():
         for what, value in (("effort", joint.effort), ("velocity", joint.speed)):
@@ -135,6 +144,15 @@ def read_model(path: Path) -> RawModel:
         notes.append(
             f"masses and inertias of {listing(changed, 4)} are those that MuJoCo's compiler sets, not the written ones"
         )
+    if file.is_urdf and (weightless := _weightless(file, bare)):
+        notes.append(
+            f"links {listing(weightless, 4)} have shapes for collisions and no <inertial>: they weigh nothing here, and MuJoCo would "
+            "weigh the shapes"
+        )
+    if odd := impossible_parts(bare, written):
+        notes.append(
+            f"inertias of {listing(odd, 4)}, which no joint moves, are none that a body has; they count as they are written"
+        )
     name = spec.modelname or path.stem
     pushing = thrusters(model, notes)
     names_world = not file.is_urdf or file.has("link", names[0])
@@ -150,7 +168,7 @@ def _parsed(file: XmlFile) -> Any:
     import mujoco
 
     try:
-        if file.path.suffix == XACRO:
+        if file.path.suffix == XACRO or file.hangs_from_world:
             spec = mujoco.MjSpec.from_string(file.content)
         else:
             spec = mujoco.MjSpec.from_file(str(file.path))
@@ -159,6 +177,17 @@ def _parsed(file: XmlFile) -> Any:
     spec.compiler.fusestatic = False
     _name_everything(spec, file.is_urdf)
     return spec
+
+
+def _weightless(file: XmlFile, model: Any) -> list[str]:
+    """Return the links of a URDF that touch things, are fixed to others and have no inertia."""
+    names = [
+        link.get("name", "")
+        for link in file.root.findall("link")
+        if link.find("inertial") is None and link.find("collision") is not None
+    ]
+    bodies = [(name, model.body(name)) for name in names]
+    return [name for name, body in bodies if body.parentid[0] and not body.jntnum[0]]
 
 
 def _placed(model: Any, held: Mapping[str, float]) -> Any:
@@ -282,16 +311,16 @@ def _joint(model: Any, data: Any, j: int, urdf: dict[str, UrdfJoint]) -> RawJoin
     lower, upper = (float(value) for value in model.jnt_range[j])
     effort, speed = motor_torque(model, j), servo_speed(model, j)
     rotor, drag = geared(model, j, "armature"), geared(model, j, "damping")
-    free = False
+    free, half = False, None
     if name in urdf:
         effort, speed = urdf[name].effort, urdf[name].speed
-        free = urdf[name].range in ("free", "none")
+        free, half = urdf[name].range in ("free", "none"), urdf[name].half
     return RawJoint(
         name,
         kinds[int(model.jnt_type[j])],
         tidy_directions(data.xaxis[j]),
         np.array(data.xanchor[j]),
-        (lower, upper) if model.jnt_limited[j] and not free else None,
+        (lower, upper) if model.jnt_limited[j] and not free else half,
         effort,
         speed,
         float(model.dof_armature[dof]) + rotor,

@@ -24,7 +24,7 @@ DECLARED = re.compile(r"\s*<\?xml[^>]*?\sencoding\s*=\s*[\"']([^\"']*)[\"']")
 class UrdfJoint:
     """A joint's ``effort`` and ``speed`` (NaN where not given), the joint it mimics, if any, whose position times
     ``multiplier`` plus ``offset`` is its own, and its ``range``: ``free`` for a joint that has no limits though its type asks for them, ``none`` where they
-    leave it at zero, else empty."""
+    leave it at zero, else empty. ``half`` are the limits [rad, m] of a joint that has one, with zero as the other."""
 
     effort: float
     speed: float
@@ -32,6 +32,7 @@ class UrdfJoint:
     range: str = ""
     multiplier: float = 1.0
     offset: float = 0.0
+    half: tuple[float, float] | None = None
 
 
 class XmlFile:
@@ -48,6 +49,7 @@ class XmlFile:
             self._check_encoding(text)
             self.root = ElementTree.fromstring(text)
             self.content = text
+            self.hangs_from_world = self._add_world()
             # Comments are blanked: nothing is found in them, and all other positions stay.
             self.text = re.sub(r"<!--.*?-->", _blanked, text, flags=re.DOTALL)
         except OSError as error:
@@ -65,6 +67,20 @@ class XmlFile:
                 "the root element <robot> of a URDF or <mujoco> of an MJCF file",
                 f"<{self.root.tag}>",
             )
+
+    def _add_world(self) -> bool:
+        """Add a link ``world`` where a joint hangs from it and the URDF has none, as Drake welds a robot to its world. Return
+        whether that was so."""
+        parents = [joint.find("parent") for joint in self.root.findall("joint")]
+        hangs = any(parent is not None and parent.get("link") == WORLD for parent in parents)
+        if not self.is_urdf or not hangs or self.has("link", WORLD):
+            return False
+        self.root.insert(0, ElementTree.Element("link", name=WORLD))
+        # Behind the root's tag, on its line: all other lines stay.
+        self.content = re.sub(
+            r"<robot\b[^>]*>", rf'\g<0><link name="{WORLD}"/>', self.content, count=1
+        )
+        return True
 
     def _check_encoding(self, text: str) -> None:
         """Raise ``RobotError`` where the text, read as UTF-8, is another one in the encoding that it declares."""
@@ -104,6 +120,10 @@ class XmlFile:
         return before.count("\n") + 1, found.start() - before.rfind("\n")
 
 
+WORLD = "world"
+"""The link from which a robot hangs that is welded to the ground, in Drake without being declared."""
+
+
 def _blanked(comment: re.Match[str]) -> str:
     return re.sub(r"[^\n]", " ", comment.group())
 
@@ -121,20 +141,30 @@ def urdf_joints(file: XmlFile) -> dict[str, UrdfJoint]:
         by = {} if mimic is None else mimic.attrib
         found[joint.get("name", "")] = UrdfJoint(
             effort, speed, mimics, _range(joint),
-            _value(by.get("multiplier", "1")), _value(by.get("offset", "0")),
+            _value(by.get("multiplier", "1")), _value(by.get("offset", "0")), _half(joint),
         )  # fmt: skip
     return found
 
 
 def _range(joint: ElementTree.Element) -> str:
     """Return the ``range`` of a ``UrdfJoint``."""
-    limit = joint.find("limit")
-    if limit is None or joint.get("type") not in ("revolute", "prismatic"):
+    if joint.get("type") not in ("revolute", "prismatic"):
         return ""
-    given = [limit.get(key) for key in ("lower", "upper")]
+    limit = joint.find("limit")
+    given = [None if limit is None else limit.get(key) for key in ("lower", "upper")]
     if given == [None, None]:
         return "free"
     return "none" if [_value(text or "0") for text in given] == [0.0, 0.0] else ""
+
+
+def _half(joint: ElementTree.Element) -> tuple[float, float] | None:
+    """Return the limits of a joint of which only one is written; the format's default of the other is zero."""
+    limit = joint.find("limit")
+    if limit is None or joint.get("type") not in ("revolute", "prismatic"):
+        return None
+    given = [limit.get(key) for key in ("lower", "upper")]
+    lower, upper = (_value(text or "0") for text in given)
+    return (lower, upper) if given.count(None) == 1 and lower < upper else None
 
 
 def check_urdf(file: XmlFile) -> None:

@@ -1,4 +1,4 @@
-"""What it costs to record a graph, from its declarations: bytes a minute before compression, and the ring.
+"""The cost of recording a graph, from its declarations: bytes a minute before compression, and the ring.
 
 As ``logs.file.held_fields`` has it, large fields of slow blocks count where their blocks run, all others
 in every tick. What a file takes after compression depends on the signals; the shipped jumps take a third.
@@ -35,7 +35,7 @@ class FieldCost:
 
 @dataclass(frozen=True)
 class RecordingCost:
-    """What a graph's recording takes, before compression.
+    """The bytes of a graph's recording, before compression.
 
     Attributes:
         bus_bytes: bytes of all signals.

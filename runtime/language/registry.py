@@ -116,6 +116,20 @@ def find_block(name: str, folder: Path | None = None) -> type[Block]:
     raise UnknownBlockError(f"there is no block called {name!r}")
 
 
+def attribute_of(package: str, name: str) -> type[Block]:
+    """Return a block for the ``__getattr__`` of its package, ``aloft.blocks`` or ``aloft.hal``.
+
+    Raises:
+        AttributeError: there is none of that name.
+    """
+    short = package.rpartition(".")[2]
+    if not name[:1].isupper() or f"{short}.{name}" not in _own_blocks():
+        near = difflib.get_close_matches(f"{short}.{name}", _own_blocks(), 1)
+        hint = f"; the nearest block is {near[0]}" if near and name[:1].isupper() else ""
+        raise AttributeError(f"module {package!r} has no attribute {name!r}{hint}")
+    return find_block(f"{short}.{name}")
+
+
 _STAND_INS: ContextVar[Mapping[str, type[Block]] | None] = ContextVar("stand-ins", default=None)
 
 

@@ -77,6 +77,12 @@ WATCHDOG = 0.015
 """The default of ``LinkSettings.watchdog`` [s]. What damps the actuators looks every millisecond, so
 they are in damping within 20 ms."""
 
+LEASE = 3.0
+"""The default of ``LinkSettings.lease`` [s]. On a machine with ten busy processes for two processors a part is silent for
+up to a second; what a robot needs sooner is not of this kind, but the watch of commands."""
+PATIENCE = 30.0
+"""The default of ``LinkSettings.patience`` [s]."""
+
 LinkMode = Literal["lockstep", "free"]
 WhenLate = Literal["hold", "safe", "stop"]
 ClockKind = Literal["free", "paced", "robot"]
@@ -112,6 +118,10 @@ class LinkSettings:
     watchdog: float | None = None
     """Longest silence allowed to a link that brings commands to actuators [s]; by default
     ``WATCHDOG`` for real actuators, and any time for simulated ones."""
+    lease: float = LEASE
+    """Silence after which the other machines take a part for gone [s]."""
+    patience: float = PATIENCE
+    """The longest time for which a part in lockstep waits for a message [s]."""
 
     def policy_of(self, source: str) -> LinkPolicy:
         """Return the policy of the links that carry the outputs of the block ``source``."""
@@ -136,6 +146,14 @@ class ClockSpec:
 
 
 @dataclass(frozen=True)
+class RecordingSpec:
+    """Settings of the recorder."""
+
+    ring_bytes: int = 1 << 26
+    """Bytes of the ring between run and recorder, at most, but that it always holds four keyframes."""
+
+
+@dataclass(frozen=True)
 class CheckedGraph:
     """A graph that may run: its blocks in file order, and the order in which they execute."""
 
@@ -149,6 +167,7 @@ class CheckedGraph:
     """The duration of a run in ticks; ``None`` if it runs until it is stopped."""
     robot: RobotDescription | None = None
     clock: ClockSpec = ClockSpec()
+    recording: RecordingSpec = RecordingSpec()
     file: str = ""
     """The graph file, as it was given; files that the graph names are relative to its folder."""
     overrides: Mapping[str, Any] = field(default_factory=dict)

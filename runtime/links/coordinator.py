@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,7 +28,7 @@ from ..transports.transport import MessageCallback, Transport, tick_key
 from .command_watch import CommandWatch
 from .free_link import LatestReceiver
 from .lockstep_link import LinkOutput, LockstepReceiver, Mailbox, MailTimeoutError
-from .peers import PartPhase, PeerError, PeerStates
+from .peers import REPEAT, PartPhase, PeerError, PeerStates
 
 
 class PartClock(Clock):
@@ -224,6 +225,7 @@ class LockstepCoordinator(Block):
         self._publishers: dict[str, MessageCallback] = {}
         self._mail: dict[str, Mailbox[TickMessage]] = {}
         self._tick = 0
+        self._next_probe, self._probe_period = 0.0, 0.5 * REPEAT
         self._opened = self._fault_reported = False
 
     # -- before the first tick ---------------------------------------------------------------------
@@ -257,8 +259,12 @@ class LockstepCoordinator(Block):
             for link, sender in self._links.senders.items()
             if not any(self.peers.has_checked(name, link) for name in self.peers.names)
         ]
-        for sender in waiting:
-            sender.probe()
+        if waiting and time.monotonic() >= self._next_probe:
+            for sender in waiting:
+                sender.probe()
+            # ever more rarely: on a slow network large messages would queue up faster than they leave
+            self._probe_period *= 2.0
+            self._next_probe = time.monotonic() + self._probe_period
         return not waiting and all(
             self.peers.checked(box.link.name) for box in self._links.receivers
         )
@@ -349,11 +355,15 @@ class LockstepCoordinator(Block):
             # longer than for a message, so that who misses one can say which
             return self._mail[name].take(tick * _ROUNDS + round_, 2.0 * self._timeout)
         except MailTimeoutError:
-            text = f"machine {name!r} has not ended tick {tick} in {2.0 * self._timeout:g} s"
+            text = (
+                f"machine {name!r} has not ended tick {tick} in {2.0 * self._timeout:g} s. From {name} "
+                f"{self.peers.measured(name)}"
+            )
             raise RunError(text, tick=tick) from None
 
     def _listener(self, name: str, box: Mailbox[TickMessage]) -> Callable[[bytes], None]:
         def on_message(data: bytes) -> None:
+            self.peers.traffic[name].add(len(data))
             try:
                 run, number, kind = _HEAD.unpack_from(data)
                 if run != self.peers.run_of(name):

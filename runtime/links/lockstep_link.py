@@ -129,6 +129,7 @@ class LockstepReceiver:
 
     def on_message(self, data: bytes) -> None:
         """Take a message; a thread of the network calls this."""
+        self._peers.traffic[self.link.sender].add(len(data))
         run = self._peers.run_of(self.link.sender)
         if run is None:
             return  # it has not said hello yet
@@ -161,8 +162,9 @@ class LockstepReceiver:
             damaged = f"; {self.damaged} were damaged, the last: {self._reason}"
             raise RunError(
                 f"link {self.link.name}: the message of tick {tick} has not come in "
-                f"{self._timeout:g} s. {self.received} came before"
-                + (damaged if self.damaged else ""),
+                f"{self._timeout:g} s (links.patience). {self.received} came before"
+                + (damaged if self.damaged else "")
+                + f". From {self.link.sender} {self._peers.measured(self.link.sender)}",
                 block=self.link.source,
                 tick=tick,
             ) from None

@@ -19,8 +19,11 @@ from typing import Any, Self
 from zlib import crc32
 
 from ..placement.placed import PlacedGraph
+from ..running.lateness import LatenessCounter
 from ..running.memory import BoundGraph
+from ..running.pacing import Pacer
 from ..running.sink import Note, Sink
+from ..running.ticker import Ticker
 from ..transports.registry import network_transport, silent_endpoint
 from ..transports.transport import MessageCallback, Transport, rows_key, status_key, window_key
 from .free_link import LatestReceiver
@@ -55,6 +58,7 @@ class StatusPublisher(Sink):
         self._ended = threading.Event()
         self._tick = -1
         self._overruns = self._skipped = self._late = 0
+        self._pacer: Pacer | None = None
         self._shown = 0
         self._fresh = False
 
@@ -67,6 +71,10 @@ class StatusPublisher(Sink):
         self._ticks = [0, 0]
         self._thread = threading.Thread(target=self._run, name="aloft showing", daemon=True)
         self._thread.start()
+
+    def watch_ticker(self, ticker: Ticker) -> None:
+        """Show how late its ticks begin, if they have deadlines."""
+        self._pacer = ticker.pacer
 
     def record(self, tick: int) -> None:
         """Keep the bus for the thread that shows it, now and then."""
@@ -104,6 +112,7 @@ class StatusPublisher(Sink):
             "overruns": self._overruns,
             "skipped_periods": self._skipped,
             "late_results": self._late,
+            "lateness": None if self._pacer is None else _shown(self._pacer.lateness),
             "phase": peers.phase.name.lower(),
             "links": [link_status(box) for box in self._receivers],
             "clocks": {
@@ -138,6 +147,15 @@ class StatusPublisher(Sink):
     def _row(self, slot: int) -> bytes:
         data = bytes(self._slots[slot])
         return _HEAD.pack(crc32(data), self._peers.run, self._ticks[slot]) + data
+
+
+def _shown(counter: LatenessCounter) -> dict[str, float]:
+    """Return the lateness of ticks so far [us], the late ones, and the limit [us]."""
+    found = counter.result()
+    return {
+        "p50_us": found.p50_us, "p99_us": found.p99_us, "max_us": found.max_us,
+        "late": found.late, "late_after_us": found.late_after_us,
+    }  # fmt: skip
 
 
 def link_status(box: LockstepReceiver | LatestReceiver) -> dict[str, Any]:

@@ -41,8 +41,6 @@ from .message import MessageReader, MessageWriter
 from .path_ages import PathAges, path_sinks
 from .peers import PartPhase, PeerStates
 
-MESSAGE_TIMEOUT = 30.0
-"""Seconds that a part in lockstep waits for a message before it gives up."""
 CONNECT_TIMEOUT = 180.0
 """Seconds that a part waits at its start for the others, which may compile their kernels first."""
 COORDINATOR, PREPARED, STARTED = "~coordinator", "~prepared", "~started"
@@ -118,7 +116,7 @@ class BoundPart(BoundGraph):
         placed: the graph.
         machine: the machine.
         transport: what carries messages; the part opens it when it starts.
-        timeout: the seconds to wait for a message.
+        timeout: the seconds to wait for a message; by default the graph's ``links.patience``.
         connect_timeout: the seconds to wait for the others at the start.
         clock: the time [ns] by which free-running links and the watch of commands go.
 
@@ -135,11 +133,12 @@ class BoundPart(BoundGraph):
         machine: str,
         transport: Transport,
         *,
-        timeout: float = MESSAGE_TIMEOUT,
+        timeout: float | None = None,
         connect_timeout: float = CONNECT_TIMEOUT,
         clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self._now = clock
+        timeout = placed.graph.links.patience if timeout is None else timeout
         super().__init__(part_graph(placed, machine))
         assert isinstance(self.clock, PartClock)
         own_clock = self.clock

@@ -22,6 +22,7 @@ from ..language.errors import RunError
 from ..placement.placed import PlacedGraph
 from ..transports.transport import MessageCallback, Transport, beacon_key
 from .identity import Identity
+from .traffic import Traffic
 
 KEPT = 20
 """Estimates among which the best is chosen: as clocks drift, older ones are forgotten."""
@@ -108,6 +109,7 @@ class PeerStates:
     Attributes:
         run: the number by which this run of this part is known.
         names: the other machines.
+        traffic: what has come from each.
     """
 
     def __init__(
@@ -129,6 +131,7 @@ class PeerStates:
         self._senders = {link.name: link.sender for link in placed.links}
         self._free = free
         self._clocks = {name: ClockOffset() for name in self.names}
+        self.traffic = {name: Traffic(placed, name, machine) for name in self.names}
         self._stop_reason = stop_reason
         self._phase = PartPhase.HELLO
         self._problem = ""
@@ -342,6 +345,7 @@ class PeerStates:
             if name not in self.names or len(bytes.fromhex(state["run"])) != len(self.run):
                 return
             now = time.monotonic_ns()
+            self.traffic[name].add(len(data))
             before = self._states.get(name, {})
             self._take_refusal(name, state)
             if before and before["run"] != state["run"]:
@@ -398,8 +402,13 @@ class PeerStates:
         self._gone[name] = None
         if self._free and self._phase >= PartPhase.STARTED:
             return  # its links say what to do without it
-        text = f"machine {name!r} is gone: its process ended or froze, or the network to it is cut"
+        text = f"machine {name!r} is gone: {self.traffic[name].why_gone()}; before, {self.measured(name)}"
         self.fail(name, -1, PeerError(text))
+
+    def measured(self, name: str) -> str:
+        """Say what was measured of the network from another machine."""
+        uncertainty = self._clocks[name].uncertainty
+        return self.traffic[name].measured(2e-9 * uncertainty if uncertainty >= 0 else -1.0)
 
     def _forget(self, name: str) -> None:
         """Another part was started again: what was known of it no longer holds."""
@@ -452,7 +461,7 @@ class PeerStates:
         if missing:
             return (
                 f"{self._listed(missing)} did not become {phase.name.lower()} in {timeout:g} s; "
-                "see what is printed there"
+                f"see what is printed there. From {missing[0]} {self.measured(missing[0])}"
             )
         return f"this machine did not become {phase.name.lower()} in {timeout:g} s"
 

@@ -74,6 +74,7 @@ class Tunables:
         own_range = getattr(self._blocks[block].params, "live_range", None)
         if own_range is not None and kind in ("number", "numbers"):
             least, most = own_range(path.removeprefix(f"{block}.").partition(".")[0])
+            words = words or _in_words(least, most)
         low, high = _range(start if kind in ("number", "numbers") else None, least, most)
         text = info.description if info is not None and info.description else entry["text"]
         return {
@@ -160,6 +161,12 @@ def _bounds(info: FieldInfo | None) -> tuple[float | None, float | None, str]:
             else:
                 most = float(bound)
     return least, most, ", ".join(dict.fromkeys(words))
+
+
+def _in_words(least: float | None, most: float | None) -> str:
+    """Return bounds as a page shows them."""
+    known = (("≥", least), ("≤", most))
+    return ", ".join(f"{sign} {bound:g}" for sign, bound in known if bound is not None)
 
 
 def _constraints(info: FieldInfo | None) -> Iterator[Any]:

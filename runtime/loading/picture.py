@@ -38,6 +38,13 @@ class InputRow:
     truth: bool = False
     sources: tuple[str, ...] = ()
     """All outputs that are read, each as ``block.port``."""
+    transitions: tuple[str, ...] = ()
+    """Of each of them the change of rate, empty where there is none."""
+
+    def transition_of(self, source: str) -> str:
+        """Return the change of rate between one of the sources and the input."""
+        found = dict(zip(self.sources, self.transitions, strict=False))
+        return found.get(source, self.transition)
 
     def text(self) -> str:
         """Return the input in one line."""
@@ -144,7 +151,7 @@ def _input(
         origins = tuple(dict.fromkeys(_origin(specs, wire) for wire in source.wires.values()))
         wire_text = source.block_type.wire_text
     ends = [specs[each.rpartition(".")[0]] for each in origins]
-    changes = dict.fromkeys(_transition(graph, end, spec) for end in ends)
+    changes = tuple(_transition(graph, end, spec) for end in ends)
     ports = zip(ends, origins, strict=True)
     return InputRow(
         name,
@@ -152,9 +159,10 @@ def _input(
         signal.__name__,
         fields,
         wire.delay,
-        ", ".join(filter(None, changes)),
+        ", ".join(filter(None, dict.fromkeys(changes))),
         any(end.block_type.outputs[each.rpartition(".")[2]].truth for end, each in ports),
         origins,
+        changes,
     )
 
 
@@ -213,8 +221,8 @@ def mermaid(graph: CheckedGraph) -> str:
                     continue
                 label = f"{port} to {item.name}<br/>{item.signal}"
                 arrow = "-->"
-                if item.transition:
-                    label, arrow = f"{label}<br/>{item.transition}", "==>"
+                if change := item.transition_of(origin):
+                    label, arrow = f"{label}<br/>{change}", "==>"
                 if item.delay:
                     label, arrow = f"{label}<br/>delay {item.delay}", "-.->"
                 lines.append(f'  {names[block]} {arrow}|"{label}"| {names[row.path]}')

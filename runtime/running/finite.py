@@ -5,6 +5,8 @@ The usual check is one cheap product; only if it fails is the element searched.
 
 from __future__ import annotations
 
+import re
+import warnings
 from math import isfinite
 
 import numpy as np
@@ -17,6 +19,11 @@ _PIECE = 8192
 _TINY = 1e-150
 """The factor of every element: so small that no sum of finite products overflows, yet so large that
 usual products are not subnormal, which would be slow."""
+
+
+warnings.filterwarnings(  # the check finds it itself; setting NumPy's state in each tick would take longer
+    "ignore", "invalid value encountered in dot", RuntimeWarning, re.escape(__name__)
+)
 
 
 class NotFiniteError(AloftError):

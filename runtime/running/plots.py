@@ -76,7 +76,7 @@ def plot_signals(
     kept &= time >= start if start is not None else True
     kept &= time <= end if end is not None else True
     if not kept.any():
-        raise ValueError(f"nothing was recorded between {start} s and {end} s")
+        raise ValueError(nothing_between(start, end))
     panels = []
     for name in names:
         source, selection = read_selection(name) or (name, Selection())
@@ -127,3 +127,14 @@ def _field(spec: BlockSpec, name: str) -> Field | None:
     port, _, key = name.partition(".")
     found = {**spec.block_type.inputs, **spec.block_type.outputs}.get(port)
     return None if found is None else found.signal.fields.get(key)
+
+
+def nothing_between(start: float | None, end: float | None) -> str:
+    """Return what to say of a stretch of time without ticks, of which the ends may be open."""
+    if start is None and end is None:
+        return "nothing was recorded: there is no tick"
+    if end is None:
+        return f"nothing was recorded from {start:g} s on"
+    if start is None:
+        return f"nothing was recorded until {end:g} s"
+    return f"nothing was recorded between {start:g} s and {end:g} s"

@@ -6,12 +6,14 @@
         run.step(10)
         run["pd.command"].torque
         run["action"] = [0.1, 0.2]   # a block blocks.External
+        run["pd.stiffness"] = 40.0   # a live parameter
         run.reset()
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from difflib import get_close_matches
 from typing import Any, Self
 
@@ -29,21 +31,31 @@ from .memory import Snapshot
 from .run_result import RunResult
 from .sink import Sink
 
+Adjust = Callable[[Mapping[str, Block], Mapping[str, Any]], Adjustment]
+"""Checks new values of live parameters of some blocks: ``loading.adjust``."""
+
 
 class SteppedRun:
     """One run of a graph, stepped on demand and as fast as possible. Use it in a ``with``
     statement.
 
-    Leaving the statement sends the stop cycles and closes all blocks, whatever has happened.
+    Leaving the statement sends the stop cycles and closes all blocks, whatever has happened. With ``adjust``
+    live parameters are set by name.
 
     Raises:
         RunError: a block could not be set up or started.
     """
 
     def __init__(
-        self, graph: CheckedGraph, *, plain: bool = False, sinks: Sequence[Sink] = ()
+        self,
+        graph: CheckedGraph,
+        *,
+        plain: bool = False,
+        sinks: Sequence[Sink] = (),
+        adjust: Adjust | None = None,
     ) -> None:
         self.graph = graph
+        self._adjust = adjust
         self._executor = executor = Executor(
             graph, clock=ClockSpec(), sinks=sinks, log=False, run_hash=False, timing=False,
             plain=plain,
@@ -155,7 +167,7 @@ class SteppedRun:
 
     def __getitem__(self, name: str) -> Any:
         """Return a copy of a signal (``"pd.command"``) or of one of its fields
-        (``"pd.command.torque"``).
+        (``"pd.command.torque"``), or the value of a parameter (``"pd.stiffness"``).
 
         Raises:
             KeyError: there is none of that name; the text has the nearest.
@@ -168,23 +180,32 @@ class SteppedRun:
         if found is not None and port in type(found).outputs:
             signal: Signal = getattr(found, port)
             return type(signal).bind({n: view.copy() for n, view in signal.views().items()})
+        if found is not None and port in type(found.params).model_fields:
+            return deepcopy(getattr(found.params, port))
         raise KeyError(f"no signal {name!r}{_nearest(name, self._names())}")
 
     def __setitem__(self, name: str, value: Any) -> None:
-        """Set the vector of a block ``blocks.External``, as ``"action"`` or ``"action.y"``.
+        """Set the vector of a block ``blocks.External``, as ``"action"`` or ``"action.y"``, or a live parameter,
+        as ``"pd.stiffness"``, from the next tick on. A reset leaves parameters as they are.
 
         Raises:
             KeyError: there is no such block.
             ValueError: the value has another shape, or is not finite.
+            LoadError: there is no such parameter, it is not live, or the value is none that it may have.
+            AloftError: the block refuses the value.
         """
         self._must_be_open()
         path = name.removesuffix(".y")
         block = self._bound.blocks.get(path)
+        if block is None and self._adjust is not None and self._is_parameter(name):
+            plain = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+            self.change(self._adjust(self._bound.blocks, {name: plain}))
+            return
         if block is None or type(block).__name__ != "External":
             external = [p for p, b in self._bound.blocks.items() if type(b).__name__ == "External"]
             raise KeyError(
-                f"{name!r} is no block blocks.External, which alone can be set; "
-                f"there is {', '.join(external) or 'none'}"
+                f"{name!r} is neither a block blocks.External nor a parameter, which alone can be set; "
+                f"blocks.External: {', '.join(external) or 'none'}"
             )
         target: NDArray[np.float64] = block.x.value  # type: ignore[attr-defined]  # of blocks.External
         array = np.asarray(value, np.float64)
@@ -193,6 +214,16 @@ class SteppedRun:
         if not np.isfinite(array).all():
             raise ValueError(f"{path} cannot be set to what is not finite: {array.tolist()}")
         target[...] = array
+
+    def _is_parameter(self, name: str) -> bool:
+        """Return whether a name can only be meant as that of a parameter of a block."""
+        path = name
+        while "." in path:
+            path = path.rpartition(".")[0]
+            if path in self._bound.blocks:
+                first = name[len(path) + 1 :].partition(".")[0]
+                return first not in type(self._bound.blocks[path]).outputs
+        return False
 
     def __repr__(self) -> str:
         state = self._life.state.value if self._life.state is not LifeState.RUNNING else self.reason

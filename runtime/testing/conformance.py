@@ -384,6 +384,19 @@ def unmet_messages(
     )
 
 
+def missing_examples(block_type: type[Block]) -> str:
+    """Return what to say where no instance can be made for want of parameters; empty if one can."""
+    given = block_type.example_parameters()
+    fields = block_type.Params.model_fields
+    missing = [name for name, info in fields.items() if info.is_required() and name not in given]
+    if not missing:
+        return ""
+    return (
+        f"{', '.join(missing)} {'has' if len(missing) == 1 else 'have'} no default: return values to test with "
+        "from the class method example_parameters"
+    )
+
+
 def check_block(
     block_type: type[Block],
     params: Mapping[str, Any] | None = None,
@@ -406,8 +419,10 @@ def check_block(
         cases: names from ``conformance_cases``; by default all of them.
 
     Raises:
-        ConformanceError: the block breaks a promise.
+        ConformanceError: the block breaks a promise, or has no examples of required parameters.
     """
+    if params is None and (lacks := missing_examples(block_type)):
+        raise ConformanceError(lacks)
     given = block_type.example_parameters() if params is None else params
     description = find_robot(robot) if isinstance(robot, str) else robot
     subject = Subject(

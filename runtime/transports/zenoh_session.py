@@ -12,20 +12,58 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+from ..language.stages import LEASE, PATIENCE
 from ..placement.placed import PlacedGraph
 from .transport import beacon_key, data_key, tick_key
 
-LEASE = 500
-"""Milliseconds of silence after which a peer is taken for lost."""
+BATCH = 65_000
+"""Bytes of a message that go into one batch of Zenoh's; larger messages are fragments."""
+LEAST_BATCHES, MOST_BATCHES = 2, 16
+"""Zenoh's default number of batches in a queue, and the largest it takes."""
+DROP_AFTER = 1000
+"""Microseconds that a free-running publisher waits for room for a large message; Zenoh's default is 50 ms."""
 ROOT = "aloft"
 """The first part of every key expression."""
 
 
-def session_settings(listen: Sequence[str], connect: Sequence[str]) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Limits:
+    """What a graph asks of its sessions.
+
+    Attributes:
+        lease: the silence [s] after which others take a part for lost.
+        patience: how long a reliable message may wait for room [s]; Zenoh then closes the connection.
+        largest: the bytes of the largest message.
+    """
+
+    lease: float = LEASE
+    patience: float = PATIENCE
+    largest: int = 0
+
+    @classmethod
+    def of(cls, placed: PlacedGraph) -> Limits:
+        """Return those of a placed graph."""
+        links = placed.graph.links
+        return cls(links.lease, links.patience, max((x.payload for x in placed.links), default=0))
+
+    @property
+    def batches(self) -> int:
+        """The batches that wait for each publisher's priority: room for the largest message, and at least two."""
+        return min(MOST_BATCHES, max(LEAST_BATCHES, self.largest // BATCH + LEAST_BATCHES))
+
+
+NO_LIMITS = Limits()
+
+
+def session_settings(
+    listen: Sequence[str], connect: Sequence[str], limits: Limits = NO_LIMITS
+) -> dict[str, Any]:
     """Return the settings of a peer that listens and connects only at these endpoints, by their
     paths in Zenoh's configuration."""
+    control = "transport/link/tx/queue/congestion_control"
     return {
         "mode": "peer",
         "scouting/multicast/enabled": False,
@@ -40,19 +78,25 @@ def session_settings(listen: Sequence[str], connect: Sequence[str]) -> dict[str,
             "period_max_ms": 200,
             "period_increase_factor": 1.5,
         },
-        "transport/link/tx/lease": LEASE,
+        "transport/link/tx/lease": round(1e3 * limits.lease),
+        f"{control}/block/wait_before_close": round(1e6 * limits.patience),
+        f"{control}/drop/max_wait_before_drop_fragments": DROP_AFTER,
+        "transport/link/tx/queue/size/real_time": limits.batches,
         "transport/shared_memory/enabled": False,
     }
 
 
 def session_config(
-    listen: Sequence[str], connect: Sequence[str], secured: Mapping[str, Any] | None = None
+    listen: Sequence[str],
+    connect: Sequence[str],
+    secured: Mapping[str, Any] | None = None,
+    limits: Limits = NO_LIMITS,
 ) -> Any:
     """Return the session's settings as a Zenoh configuration; ``secured`` adds those of TLS and access."""
     import zenoh
 
     config = zenoh.Config()
-    for key, value in {**session_settings(listen, connect), **(secured or {})}.items():
+    for key, value in {**session_settings(listen, connect, limits), **(secured or {})}.items():
         config.insert_json5(key, json.dumps(value))
     return config
 

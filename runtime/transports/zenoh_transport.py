@@ -3,7 +3,7 @@
 Each machine listens at its own endpoint and connects to those before it in the graph. Congestion control,
 ``express``, priority and reliability are given for every publisher. A machine shows by a liveliness token
 that it is there. Where its process ends, the others know within milliseconds; where it freezes or the
-network is cut, after ``LEASE``.
+network is cut, after the lease.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..language.stages import MachineSpec
 from ..placement.placed import PlacedGraph
 from .tls import check_endpoints, secured
 from .transport import MessageCallback, NetworkTransport, free_ports
-from .zenoh_session import as_chunk, prefix_of, session_config
+from .zenoh_session import NO_LIMITS, Limits, as_chunk, prefix_of, session_config
 
 
 class ZenohTransport(NetworkTransport):
@@ -29,6 +29,7 @@ class ZenohTransport(NetworkTransport):
         machines: all machines of the graph, in its order.
         wait: whether sending waits where the queue is full. Lockstep waits, since nothing may be
             lost; a free-running part drops, since nothing may wait.
+        limits: lease, patience and the largest message.
         security: TLS and access control, as ``tls.secured`` gives them; none: neither.
     """
 
@@ -38,12 +39,14 @@ class ZenohTransport(NetworkTransport):
         machines: Sequence[MachineSpec],
         *,
         wait: bool = True,
+        limits: Limits = NO_LIMITS,
         security: Mapping[str, Any] | None = None,
     ) -> None:
         self._prefix = prefix_of(graph)
         self._security = security
         self._machines = tuple(machines)
         self._wait = wait
+        self._limits = limits
         self._session: Any = None
         self._declared: list[Any] = []
         self._farewells: list[Callable[[], None]] = []
@@ -62,6 +65,7 @@ class ZenohTransport(NetworkTransport):
             placed.graph.name,
             placed.machines,
             wait=placed.graph.links.mode == "lockstep",
+            limits=Limits.of(placed),
             security=None if keys is None else secured(placed, keys, name),
         )
 
@@ -82,7 +86,7 @@ class ZenohTransport(NetworkTransport):
 
         endpoints = [spec.endpoint for spec in self._machines]
         try:
-            self._session = zenoh.open(session_config([], endpoints, self._security))
+            self._session = zenoh.open(session_config([], endpoints, self._security, self._limits))
         except zenoh.ZError as error:
             raise AloftError(f"no session of Zenoh could be opened: {error}") from error
 
@@ -96,7 +100,10 @@ class ZenohTransport(NetworkTransport):
         try:
             self._session = zenoh.open(
                 session_config(
-                    [own], [spec.endpoint for spec in self._machines[:place]], self._security
+                    [own],
+                    [spec.endpoint for spec in self._machines[:place]],
+                    self._security,
+                    self._limits,
                 )
             )
         except zenoh.ZError as error:

@@ -68,7 +68,7 @@ def test_files(recording: Path, call: Call, tmp_path: Path) -> None:
     [
         (["wvae.y.value"], "no signal 'wvae.y.value'; the nearest are wave.y.value"),
         (["wave.y[5]"], "wave.y[5]: [5] is outside of 2 elements"),
-        (["wave.y", "--from", "7"], "nothing was recorded between 7.0 s and None s"),
+        (["wave.y", "--from", "7"], "nothing was recorded from 7 s on"),
         (["wave.y", "--svg", "no/such/file.svg"], "cannot write the plot"),
     ],
 )

@@ -166,6 +166,19 @@ def test_a_recording_without_a_robot(counted: bytes, tmp_path: Path) -> None:
     assert reason.endswith("count.rrd has no robot: nothing in it says where one is")
 
 
+def test_a_recording_without_a_tick(tmp_path: Path) -> None:
+    (tmp_path / "stops.py").write_text(
+        "from aloft import Block, Output\n"
+        "from aloft.blocks.general.vectors import Number\n"
+        "class Stops(Block):\n    y = Output(Number, text='nothing')\n"
+        "    def step(self): raise ValueError('at once')\n"
+    )
+    (tmp_path / "stops.yaml").write_text("include: [aloft:sway]\nblocks: {s: {use: stops:Stops}}\n")
+    load(tmp_path / "stops.yaml").run(sinks=[Recorder(tmp_path / "stops.rrd")], log=False)
+    reason = run_for_json("render", str(tmp_path / "stops.rrd"), code=2)["reason"]
+    assert reason.endswith("stops.rrd holds no tick; there is nothing to draw")
+
+
 def test_the_whole_robot_is_in_the_picture_head_and_soles_included(pushed: Path) -> None:
     run = read(pushed)
     take = Take(run, "", Camera())

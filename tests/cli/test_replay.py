@@ -76,11 +76,11 @@ def test_the_same_bytes(recording: Path, call: Call, call_json: CallJson) -> Non
 
 
 def test_a_recording_that_was_cut_off_is_said_to_be(recording: Path, call: Call) -> None:
-    from aloft.logs.file.messages import Content
     from aloft.logs.file.reader import read
+    from aloft.logs.file.records import Content
 
     rows = read(recording).scan.of(Content.ROWS)
-    recording.write_bytes(recording.read_bytes()[: rows[-1].end])
+    recording.write_bytes(recording.read_bytes()[: rows[-1].end + 20])
     last = rows[-1].last
     text = call("replay", str(recording), "--check").stdout
     assert f"every byte of {last + 1} ticks" in text.replace("\n", " ")

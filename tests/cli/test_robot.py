@@ -92,6 +92,7 @@ def test_show_for_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert about["sensors"] == {"encoders": 2, "imu": False, "switches": 0, "mounted": {}}
     assert about["missing"] == [
         "no speed limit of slider: 20 m/s is assumed",
+        "no actuator moves hinge",
         "rotor inertia is zero; write rotor_inertia under profiles",
     ]
 

@@ -33,7 +33,7 @@ def test_a_push_moves_it(folder: Path, call_json: CallJson) -> None:
 
 def test_what_keeps_a_robot_from_standing_is_said(folder: Path, call_json: CallJson) -> None:
     (folder / "stick.xml").write_text(STICKS.replace("<freejoint/>", ""))
-    found = call_json("robot", "stand", "--robot", "stick.xml", code=2)
+    found = call_json("robot", "stand", "stick.xml", code=2)
     assert found["reason"].startswith("sticks cannot stand: its base is fixed")
 
 
@@ -43,6 +43,9 @@ def test_wrong_words_leave_with_exit_code_2(folder: Path, call: Call, call_json:
         "expected such as --push 0.1m/s" in call("robot", "stand", "--push", "3 m", code=2).stderr
     )
     assert "no robot called" in call_json("robot", "stand", "--robot", "nobody", code=2)["reason"]
+    assert call_json("robot", "stand", "a1", "--robot", "go2", code=2)["reason"] == (
+        "two robots: a1 and --robot go2; name one"
+    )
     assert (
         "leave out --seed" in call("robot", "stand", "--seeds", "0:2", "--seed", "3", code=2).stderr
     )

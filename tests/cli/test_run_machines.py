@@ -273,7 +273,24 @@ def test_a_part_that_freezes(started: subprocess.Popen[str], here: Path) -> None
     os.kill(ground, signal.SIGCONT)  # it finds that the others have gone on without it
     result = result_of(started)
     assert result["exit_code"] == 3
-    assert "is gone: its process ended or froze, or the network to it is cut" in result["reason"]
+    assert "is gone: its process froze, or the network to it is cut or too slow" in result["reason"]
+    assert (
+        "links.lease is 3 s; before, " in result["reason"] and "kB/s at 200 Hz" in result["reason"]
+    )
+
+
+@pytest.mark.long
+def test_a_part_that_stands_still_for_less_than_the_lease_is_waited_for(
+    started: subprocess.Popen[str], here: Path
+) -> None:
+    ground = parts_of(started)["ground"]
+    os.kill(ground, signal.SIGSTOP)
+    time.sleep(1.2)  # as a machine with ten busy processes for two processors does
+    os.kill(ground, signal.SIGCONT)
+    time.sleep(4.0)  # more than the lease
+    assert started.poll() is None and not (here / "damping.txt").exists()
+    started.send_signal(signal.SIGINT)
+    assert result_of(started)["reason"] == "stopped by SIGINT"
 
 
 @pytest.mark.long

@@ -76,6 +76,46 @@ def test_a_recording_becomes_a_test_that_pytest_runs(
     assert not answer["success"] and answer["pytest_exit_code"] == 1
 
 
+USERS = {
+    "broken.py": "from aloft import Block\n\nimport no_such_library\n",
+    "wrong.py": "from aloft import Block\nclass A(Block:\n    pass\n",
+    "empty.py": "from aloft import Block\n",
+    "needs.py": """\
+from aloft import Block, Output, Parameters, parameter
+from aloft.blocks.general.vectors import Vector
+
+class Needs(Block):
+    \"\"\"Needs three values.\"\"\"
+
+    class Params(Parameters):
+        n: int = parameter(text="elements")
+        gain: float = parameter(text="a number")
+
+    params: Params
+    y = Output(Vector, text="the number")
+
+    def step(self) -> None:
+        self.y.value[:] = self.params.gain
+""",
+}
+
+
+def test_modules_of_a_user(folder: Path, call_json: CallJson) -> None:
+    for name, text in USERS.items():
+        (folder / name).write_text(text)
+    for target in ("broken:Block", "broken"):
+        answer = call_json("test", target, code=2)
+        assert answer["reason"] == "ModuleNotFoundError: No module named 'no_such_library'"
+        assert answer["where"].endswith("broken.py:3")
+    assert call_json("test", "wrong", code=2)["where"].endswith("wrong.py:2:14")
+    assert call_json("test", "empty", code=2)["reason"] == "the module empty defines no block"
+    (check,) = call_json("test", "needs", code=1)["checks"]
+    assert (check["block"], check["check"]) == ("needs:Needs", "example_parameters")
+    assert check["problem"] == (
+        "n, gain have no default: return values to test with from the class method example_parameters"
+    )
+
+
 def test_what_is_refused(folder: Path, call_json: CallJson) -> None:
     def reason(*arguments: str) -> str:
         return str(call_json("test", *arguments, code=2)["reason"])

@@ -12,9 +12,9 @@ from aloft.files.cache import Cache, cache_root, make_folders, trusted_file, uns
 from aloft.mathematics.compiling.store import CACHE as KERNELS
 from aloft.mathematics.kept_arrays import CACHE as ARRAYS
 from aloft.planner.library.validation_cache import NOTES
-from aloft.planner.solving.compilation import LIBRARIES
+from aloft.planner.solving.kept_functions import FUNCTIONS
 
-KINDS = (KERNELS, ARRAYS, NOTES, LIBRARIES)
+KINDS = (KERNELS, ARRAYS, NOTES, FUNCTIONS)
 DATA = bytes(range(256)) * 3
 
 
@@ -40,7 +40,7 @@ def test_no_flipped_bit_and_no_cut_is_used(cache: Cache) -> None:
             damaged = bytearray(whole)
             damaged[place] ^= 1 << bit
             path.write_bytes(damaged)
-            assert cache.load("ab/cd") is None and cache.loadable("ab/cd") is None
+            assert cache.load("ab/cd") is None
     for length in (0, 1, module.DIGEST - 1, module.DIGEST, len(whole) - 1):
         path.write_bytes(whole[:length])
         assert cache.load("ab/cd") is None
@@ -55,9 +55,9 @@ def test_exchanged_files_are_not_used() -> None:
     first.write_bytes(two)
     second.write_bytes(one)
     assert KERNELS.load("ab/1") is None and KERNELS.load("ab/2") is None
-    other = kept(LIBRARIES, "ab/1", b"one")
+    other = kept(FUNCTIONS, "ab/1", b"one")
     other.write_bytes(one)
-    assert LIBRARIES.load("ab/1") is None, "nor one of another kind"
+    assert FUNCTIONS.load("ab/1") is None, "nor one of another kind"
 
 
 def test_the_digest_of_nothing_is_not_nothing() -> None:

@@ -40,7 +40,7 @@ def planned(robot_name: str) -> PlannedJump:
         "effort": 0.9,
     }
     more = {"knots": KNOTS if robot is QUADRUPED else FINER}
-    return solve_jump(make_task({**asked, **more}), robot, compiled=False)
+    return solve_jump(make_task({**asked, **more}), robot)
 
 
 @pytest.mark.long
@@ -106,7 +106,7 @@ def test_fore_feet_leave_first_and_hind_feet_land_last() -> None:
     turns = {"take_off": {"fore": 0.06}, "touchdown": {"hind": 0.06}}
     values = {"recipe": "paper", "name": "bound", "rise": 0.08, "distance_x": 0.1, **turns}
     task = make_task({**values, "knots": {**KNOTS, "landing": 10}, "impact": True})
-    plan = solve_jump(task, QUADRUPED, compiled=False)
+    plan = solve_jump(task, QUADRUPED)
     report = check_plan(plan, QUADRUPED)
     exact = {"force_without_contact", "force_balance", "violation", "pull", "friction", "rise"}
     assert not exact & {test.name for test in report.failed}, report.explain()

@@ -55,7 +55,7 @@ def asked(rise: float, **more: object) -> JumpTask:
 @lru_cache(maxsize=2)
 def planned(rise: float, moving: tuple[str, ...] = ("*_arm",)) -> PlannedJump:
     more = {"moving": list(moving)} if moving else {}
-    return solve_jump(asked(rise, **more), ROBOT, compiled=False)
+    return solve_jump(asked(rise, **more), ROBOT)
 
 
 @pytest.mark.long  # the solvers try everything before they give up

@@ -39,6 +39,17 @@ def test_bruce_in_millimetres_or_grams_is_named() -> None:
     assert wrong_size(scaled(bruce, 1.5, 2.0)) == ()
 
 
+def test_a_link_denser_than_any_material_is_named() -> None:
+    bruce = find_robot("bruce")
+    links = tuple(
+        link.model_copy(update={"mass": 1000.0 * link.mass}) if link.name == "left_calf" else link
+        for link in bruce.links
+    )
+    assert sum(link.name == "left_calf" for link in links) == 1
+    (said,) = wrong_size(bruce.changed(links=links))
+    assert said.startswith("the inertia of left_calf (") and "denser than any material" in said
+
+
 def test_the_check_up_names_a_joint_that_is_nowhere_near_its_links() -> None:
     bruce = find_robot("bruce")
     assert not any(

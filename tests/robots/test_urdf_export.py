@@ -183,7 +183,7 @@ def test_other_programs_have_its_dynamics_as_the_page_loads_it(
 def test_drake_has_its_dynamics_as_the_page_loads_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytest.importorskip("pydrake")
+    pytest.importorskip("pydrake", reason="pip install drake, of the extra `peers`")
     robot, names = find_robot("bruce"), loaded("from pydrake", tmp_path, monkeypatch)
     plant, columns = names["plant"], names["columns"]
     assert {*columns} == {joint.name for joint in robot.joints}

@@ -99,6 +99,24 @@ def test_live_parameters_change_between_steps_and_the_outcome_is_there_at_any_ti
         run.change(adjust({"noise": noise}, {"noise.std": 1.0}))
 
 
+def test_a_live_parameter_is_read_and_set_by_its_name(graph: Graph) -> None:
+    with graph.open() as run:
+        run.step(3)
+        run["noise.std"] = np.float64(0.0)
+        run.step()
+        assert run["noise.std"] == 0.0
+        assert np.array_equal(run["sum.y.value"], [1.0, 1.0])
+        run.reset()
+        assert run["noise.std"] == 0.0
+        for name, message in (
+            ("noise.sdt", "no parameter 'sdt'"), ("noise.seed", "cannot be changed while the graph runs"),
+        ):  # fmt: skip
+            with pytest.raises(LoadError, match=message):
+                run[name] = 1
+        with pytest.raises(KeyError, match=r"neither a block blocks\.External nor a parameter"):
+            run["noise.y"] = 1.0
+
+
 def test_a_seed_changes_every_seed(graph: Graph) -> None:
     with graph.open(seed=3) as a, graph.open(seed=4) as b, graph.with_seed(3).open() as c:
         for run in (a, b, c):
@@ -111,7 +129,9 @@ def test_what_is_refused(graph: Graph) -> None:
     with graph.open() as run:
         with pytest.raises(KeyError, match=r"no signal .place\.z.; the nearest is place\.y"):
             run["place.z"]
-        with pytest.raises(KeyError, match=r"is no block blocks.External, .* there is push"):
+        with pytest.raises(
+            KeyError, match=r"neither a block blocks\.External nor a parameter, .*: push"
+        ):
             run["place"] = 1.0
         with pytest.raises(ValueError, match=r"push has shape \(2,\), not \(3,\)"):
             run["push"] = [1.0, 2.0, 3.0]

@@ -50,6 +50,11 @@ WRONG: dict[str, tuple[Callable[[], RobotDescription], str, str]] = {
     "grams for kilograms": (
         lambda: with_part("links", "left_calf", inertia=(0.3, 0.4, 0.1, 0.0, 0.0, 0.0)),
         "link left_calf", "radius of gyration"),
+    "an inertia about the joint": (
+        lambda: with_part(
+            "links", "left_calf", shapes=(), com=(0.0, 0.0, -0.1), mass=0.2, inertia=(0.0031, 0.0031, 0.0001, 0.0, 0.0, 0.0)
+        ),
+        "link left_calf", "radius of gyration 0.124 m about its centre of mass, which is 0.1 m from its joint"),
     "an axis that was measured": (
         lambda: with_part("joints", "left_knee", axis=(math.sin(0.02), -math.cos(0.02), 0.0)),
         "joint left_knee", "1.1 deg off a coordinate axis"),

@@ -17,12 +17,21 @@ if TYPE_CHECKING:
     from ....robots.robot_description import RobotDescription
     from ..identification.identification import IdentifiedBody, IdentifiedDelay
 
-Recording = Annotated[Path, typer.Argument(help="The recording of a run, a file .rrd.")]
+Logs = Annotated[
+    list[Path],
+    typer.Argument(
+        help="Recordings of runs, files .rrd, or graphs with hal.LogRobot, whose logs are read."
+    ),
+]
 
 
 def identify(
-    file: Recording,
-    robot: Annotated[str, typer.Option(help="The path of the robot's block.")] = "robot",
+    files: Logs,
+    held_out: Annotated[
+        list[Path] | None,
+        typer.Option("--held-out", help="A log that judges the fit; may be repeated."),
+    ] = None,
+    robot: Annotated[str | None, typer.Option(help="The path of the robot's block.")] = None,
     base: Annotated[str, typer.Option(help="The port with the estimated base.")] = "estimator.base",
     command: Annotated[
         str, typer.Option(help="The port with the robot's commands.")
@@ -31,20 +40,42 @@ def identify(
         float, typer.Option(help="Standard deviation of the encoders' offsets [rad].", min=0.0)
     ] = 0.003,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Write the values for a graph here.")
+        Path | None,
+        typer.Option("--out", "-o", help="Write the values for a graph or a robot here."),
+    ] = None,
+    band: Annotated[
+        float | None,
+        typer.Option(
+            help="Fit below this frequency [Hz]; by default by the torques' spectra.", min=0.1
+        ),
+    ] = None,
+    trusted: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A joint whose torques are right, not only in proportion; may be repeated."
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fit mass, torso's CoM, joint friction and delay to a run, each with its standard deviation."""
+    """Fit a robot's dynamics to logs, each value with its standard deviation.
+
+    One recording of a floating base with an estimator tells mass, torso's CoM, joint friction and delay. Any other log tells what
+    the equations of motion hold of inertias, gravity, friction, rotors, torque constants and delay.
+    """
     with errors_reported(as_json):
+        if (
+            band is not None
+            or held_out
+            or trusted
+            or not _stands_alone(files, robot or "robot", base)
+        ):
+            _dynamics(files, held_out or [], robot, command, band, trusted or [], out, as_json)
+            return
+        file = files[0]
         run, description = _recorded(file)
-        body, delay = _identified(run, description, robot, base, command, encoder_std)
+        body, delay = _identified(run, description, robot or "robot", base, command, encoder_std)
         text = graph_values(run, description, body, delay, file)
-        if out is not None:
-            try:
-                out.write_text(text, encoding="utf-8")
-            except OSError as error:
-                raise AloftError(f"{out} cannot be written: {error.strerror}") from error
+        _write(out, text)
     if as_json:
         print_json(
             {
@@ -62,6 +93,57 @@ def identify(
         say(console(), f"wrote {out}: include it after the controller and its gains")
     else:
         typer.echo(text, nl=False)
+
+
+def _stands_alone(files: list[Path], robot: str, base: str) -> bool:
+    """Check for one recording of a floating base whose orientation was estimated."""
+    if len(files) != 1 or files[0].suffix in (".yaml", ".yml"):
+        return False
+    run, description = _recorded(files[0])
+    signals = run.signals()
+    named = (f"{robot}.imu.specific_force", f"{base}.orientation")
+    return description.base_joint == "floating" and any(name in signals for name in named)
+
+
+def _write(out: Path | None, text: str) -> None:
+    if out is None:
+        return
+    try:
+        out.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise AloftError(f"{out} cannot be written: {error.strerror}") from error
+
+
+def _dynamics(
+    files: list[Path], held_out: list[Path], robot: str | None, command: str, band: float | None,
+    trusted: list[str], out: Path | None, as_json: bool,
+) -> None:  # fmt: skip
+    from .identified_dynamics import (
+        as_data,
+        description_text,
+        dynamics_of,
+        residual_rows,
+        value_rows,
+    )
+
+    found, description = dynamics_of(files, held_out, robot, command, band, trusted)
+    text = description_text(found, files)
+    _write(out, text)
+    if as_json:
+        written = {"robot": description.name, "text": text, "written": str(out) if out else None}
+        print_json({"success": True, **written, **as_data(found)})
+        return
+    columns = ("value", ">found", ">+-", ">description", "unit")
+    title = f"{description.name}, below {found.fit.band:.3g} Hz"
+    console().print(table(title, columns, list(value_rows(found))))
+    columns = ("log", "joint", ">torque", ">not explained", ">by the description")
+    console().print(table("rms [N m]", columns, list(residual_rows(found))))
+    for line in found.warnings:
+        say(console(), f"warning: {line}")
+    for line in found.untold:
+        say(console(), f"not told: {line}")
+    if out is not None:
+        say(console(), f"wrote {out}: a profile for the robot's YAML")
 
 
 def _recorded(file: Path) -> tuple[RecordedRun, RobotDescription]:

@@ -78,7 +78,7 @@ def reach(
 
 def compile_functions(robot: Any, folder: Path, screen: Console) -> None:
     """Compile what plans are made with once, before the workers start."""
-    from ....cli.shared.planning import compile_once
+    from ....cli.shared.planning import derive_once
     from ....planner.library.library import PlanLibrary
     from ....planner.task.task import make_task
 
@@ -86,7 +86,7 @@ def compile_functions(robot: Any, folder: Path, screen: Console) -> None:
         make_task({"name": "", "robot": robot.name, "rise": 0.1, **more}).resolved(robot)
         for more in ({}, {"distance_y": 0.1})
     ]
-    compile_once(PlanLibrary(robot, folder, ()), tasks, screen)
+    derive_once(PlanLibrary(robot, folder, ()), tasks, screen)
 
 
 def show(told: dict[str, Any], screen: Console) -> None:

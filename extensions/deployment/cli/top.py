@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -83,6 +84,13 @@ def _live(observer: Observer) -> None:
             shown.update(_tables(observer), refresh=True)
 
 
+def _lateness(found: Mapping[str, float] | None) -> str:
+    """Format how late ticks begin; empty where they have no deadlines."""
+    if not found:
+        return ""
+    return ", ".join(f"{found[key]:.3g}" for key in ("p50_us", "p99_us", "max_us"))
+
+
 def _tables(observer: Observer) -> Group:
     from rich.console import Group
 
@@ -97,6 +105,7 @@ def _tables(observer: Observer) -> Group:
                 f"{found['rate_hz']:.1f} of {found['base_rate_hz']:g}" if known else "",
                 str(found["overruns"]) if known else "",
                 str(found["skipped_periods"]) if known else "",
+                _lateness(found.get("lateness")),
                 str(found.get("late_results", "")),
                 "" if found["silent_s"] is None else f"{found['silent_s']:.1f}",
             )
@@ -121,6 +130,7 @@ def _tables(observer: Observer) -> Group:
         ">rate [Hz]",
         ">overruns",
         ">skipped",
+        ">ticks began late by [us]: median, 99 %, longest",
         ">late results",
         ">heard [s ago]",
     )

@@ -107,8 +107,30 @@ def input_rows(
     data = np.zeros((len(rows), about["input_bytes"]), np.uint8)
     targets = views(data, about["inputs"])
     for each in about["inputs"]:
-        targets[each["name"]][...] = layout.view(rows, each["source"])
+        targets[each["name"]][...] = layout.view(
+            rows, _recorded_name(about, layout, each["source"])
+        )
     return data
+
+
+def _recorded_name(about: Mapping[str, Any], layout: Layout, source: str) -> str:
+    """Return the recorded signal that is given as an input: behind the delay, where that is outside of the library.
+
+    Raises:
+        AloftError: the delayed wire joins several sources, so no recorded signal is the input.
+    """
+    port, _, field = source.rpartition(".")
+    for delay in about.get("input_delays", ()):  # older ones have none
+        if delay["side"] == "outside" and port in delay["sources"]:
+            path, _, name = delay["reader"].rpartition(".")
+            late = f"{path}/{name}~delay.y.{field}"
+            if late not in layout.slots or f"{path}/{name}~parts.y.{field}" in layout.slots:
+                raise AloftError(
+                    f"the wire to {delay['reader']} joins parts and is delayed outside, so a recording cannot be "
+                    "compared; write the library with --delays inside"
+                )
+            return late
+    return source
 
 
 def _run(

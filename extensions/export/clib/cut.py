@@ -28,7 +28,8 @@ _USUAL = ("1", "m", "m/s", "m/s^2", "rad", "rad/s", "N", "N m", "kg", "s", "N/m"
 class Terminal:
     """An input or an output of the part: one field of a signal of the graph in it.
 
-    ``source`` is ``block.port.field`` there. ``unit`` is ``None`` where it is not checked.
+    ``source`` is ``block.port.field`` there. ``unit`` is ``None`` where it is not checked, and where ``units`` has
+    one for each element.
     ``depends`` has the names of the inputs on which an output depends within a tick.
     """
 
@@ -41,6 +42,7 @@ class Terminal:
     start: Any = 0
     depends: tuple[str, ...] = ()
     frame: str | None = None
+    units: tuple[str, ...] = ()
 
     def plain(self) -> dict[str, Any]:
         """Return the terminal as plain data."""
@@ -212,6 +214,11 @@ def _stubs(
                     "unit": each.unit,
                     "frame": _quantity(specs[block], port, field).frame,
                     "start": each.start,
+                    **(
+                        {"quaternion": True}
+                        if _quantity(specs[block], port, field).quaternion
+                        else {}
+                    ),
                 }
                 for each in found
             }
@@ -234,6 +241,10 @@ def _terminals(
             field.text or spec.block_type.outputs[port].text,
             frame=_quantity(spec, port, field_name).frame,
             start=_start(_quantity(spec, port, field_name), field.resolve(spec.dimensions)),
+            units=tuple(
+                _unit_text(Quantity(unit)) or ""
+                for unit in _quantity(spec, port, field_name).elements
+            ),
         )
         for field_name, field in fields.items()
         if wanted is None or field_name in wanted

@@ -197,6 +197,7 @@ def _struct(name: str, kind: str, terminals: Sequence[Terminal]) -> str:
         for field, each in fields:
             sizes = "".join(f"[{size}]" for size in each.shape)
             unit = "any unit" if each.unit is None else f"[{each.unit}]" if each.unit else "[1]"
+            unit = f"[{', '.join(text or 'any' for text in each.units)}]" if each.units else unit
             frame = f", in {each.frame}" if each.frame else ""
             own = c_name(port if alone else field)
             indent = "    " if alone else "        "

@@ -5,6 +5,7 @@ import loadMujoco from "@mujoco/mujoco";
 import { World } from "./world.js";
 
 const BLOW = 0.01, LONGEST = 1.2; // s that a push lasts; N s of the hardest
+const PAPERS = 0.7; // N s of the paper's push: 70 N for 10 ms
 const PER_METRE = 2.5; // N s of a push by how far the mouse was dragged
 const FLIGHT = 3, NEVER = -1; // a phase; what the score writes where something has not happened
 const query = new URLSearchParams(location.search);
@@ -168,12 +169,19 @@ window.pushes = []; // for tests: all that were given [N s, world]
 let dragged = null, start = null, plane = null, blow = null, left = 0, shown = new THREE.Vector3(), showing = 0;
 const ray = new THREE.Raycaster();
 
-function under(event) {
+function under({ clientX, clientY }, aside = 0, below = 0) {
   const box = canvas.getBoundingClientRect();
   ray.setFromCamera(new THREE.Vector2(
-    (2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height,
+    (2 * (clientX + aside - box.left)) / box.width - 1, 1 - (2 * (clientY + below - box.top)) / box.height,
   ), camera);
   return ray;
+}
+
+const NEAR = [[0, 0], ...[15, 30].flatMap((r) => [...Array(8).keys()].map((k) => [r * Math.cos((k * Math.PI) / 4), r * Math.sin((k * Math.PI) / 4)]))];
+/** Whether the robot is within 30 px of the pointer: a finger is no needle. */
+function hits(event) {
+  const meshes = parts.map((part) => part.mesh);
+  return NEAR.some(([aside, below]) => under(event, aside, below).intersectObjects(meshes).length);
 }
 
 function onPlane(event) {
@@ -181,7 +189,7 @@ function onPlane(event) {
 }
 
 canvas.addEventListener("pointerdown", (event) => {
-  if (!world || !under(event).intersectObjects(parts.map((part) => part.mesh)).length) return;
+  if (!world || !hits(event)) return;
   // level, at the torso's height when the drag begins: the robot moves on under the mouse
   plane = new THREE.Plane(new THREE.Vector3(0, 0, 1), -torso(world).z);
   start = onPlane(event);
@@ -191,6 +199,7 @@ canvas.addEventListener("pointerdown", (event) => {
   dragged = new THREE.Vector3();
 });
 canvas.addEventListener("pointermove", (event) => {
+  if (!event.buttons) canvas.style.cursor = world && hits(event) ? "crosshair" : "grab";
   const here = start && onPlane(event);
   if (here) dragged = here.sub(start).multiplyScalar(PER_METRE).clampLength(0, LONGEST);
 });
@@ -232,6 +241,17 @@ const COLOURS = { force: ["right", "left"], momentum: ["x", "y", "z"], height: [
 const colourOf = (name) => getComputedStyle(document.querySelector(`.${name}`)).color;
 const SHADES = { 1: 0.05, 2: 0.16, 3: 0, 4: 0.16, 5: 0.05 }; // by the phase
 
+/** The stretches of rows that have one phase. */
+function bands() {
+  const found = [];
+  rows.forEach(({ phase }, k) => {
+    const last = found[found.length - 1];
+    if (last?.phase === phase) last.to = k;
+    else found.push({ phase, from: Math.max(0, k - 1), to: k });
+  });
+  return found;
+}
+
 function plot(canvas2) {
   const of = canvas2.dataset.of, ratio = devicePixelRatio;
   const width = (canvas2.width = canvas2.clientWidth * ratio), height = (canvas2.height = canvas2.clientHeight * ratio);
@@ -243,11 +263,24 @@ function plot(canvas2) {
   const x = (k) => (k / (rows.length - 1)) * (width - 60 * ratio) + 50 * ratio;
   const y = (value) => height - 6 * ratio - ((value - low) / (high - low)) * (height - 16 * ratio);
   const ink = colourOf("phase");
-  for (let k = 1; k < rows.length; k += 1) { // phases as shades
-    pen.globalAlpha = SHADES[rows[k].phase] ?? 0;
-    pen.fillStyle = ink;
-    pen.fillRect(x(k - 1), 0, x(k) - x(k - 1) + 0.5, height);
+  pen.fillStyle = ink;
+  pen.font = `${11 * ratio}px system-ui`;
+  for (const { phase, from, to } of bands()) { // each phase is one shade, so that nothing overlaps
+    pen.globalAlpha = SHADES[phase] ?? 0;
+    pen.fillRect(x(from), 0, x(to) - x(from), height);
+    pen.globalAlpha = 0.75;
+    const name = world.about.phases[phase];
+    if (of === "height" && pen.measureText(name).width < x(to) - x(from) - 4 * ratio) pen.fillText(name, x(from) + 2 * ratio, 11 * ratio);
   }
+  const period = world.about.period, seconds = rows.length * period;
+  for (let mark = 0.5; mark < seconds; mark += 0.5) { // half seconds
+    pen.globalAlpha = 0.15;
+    pen.fillRect(x(mark / period), 0, ratio, height);
+    pen.globalAlpha = 0.75;
+    if (of === "torque" && mark % 1 === 0) pen.fillText(`${mark} s`, x(mark / period) + 3 * ratio, height - 4 * ratio);
+  }
+  pen.globalAlpha = 0.3;
+  if (low < 0 && high > 0) pen.fillRect(50 * ratio, y(0), width, ratio);
   pen.globalAlpha = 1;
   const line = (value, dashed) => {
     pen.setLineDash(dashed ? [5 * ratio, 4 * ratio] : []);
@@ -258,8 +291,6 @@ function plot(canvas2) {
   pen.lineWidth = 1.4 * ratio;
   if (of === "height") { pen.strokeStyle = "gray"; line((row) => row.planned[0], true); }
   COLOURS[of].forEach((name, k) => { pen.strokeStyle = colourOf(name); line((row) => row[of][k], false); });
-  pen.fillStyle = ink;
-  pen.font = `${11 * ratio}px system-ui`;
   pen.fillText(high.toPrecision(3), 2, 12 * ratio);
   pen.fillText(low.toPrecision(3), 2, height - 4 * ratio);
 }
@@ -339,6 +370,13 @@ fields.jump.addEventListener("change", async () => { await listRobots(); await b
 fields.robot.addEventListener("change", begin);
 form.addEventListener("submit", (event) => { event.preventDefault(); begin(); });
 
+byId("push").addEventListener("click", () => {
+  const turn = (Number(fields.angle.value) * Math.PI) / 180, size = Number(fields.impulse.value) || PAPERS;
+  if (world && !world.ended) give(new THREE.Vector3(Math.cos(turn), Math.sin(turn), 0).multiplyScalar(size));
+});
+
+const speed = query.get("speed"), speeds = [...fields.speed.options].map((option) => option.value);
+if (Number(speed) > 0 && !speeds.includes(speed)) fields.speed.add(new Option(`${speed} x real time`, speed));
 for (const name of ["jump", "impulse", "angle", "speed"]) if (query.has(name)) fields[name].value = query.get(name);
 told();
 await listRobots();

@@ -51,7 +51,7 @@ def page(
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=folder))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     with Browser(tmp_path_factory.mktemp("chromium"), (1280, 800)) as browser:
-        browser.open(f"http://127.0.0.1:{server.server_port}/index.html?speed=1")
+        browser.open(f"http://127.0.0.1:{server.server_port}/index.html?speed=0.7&impulse=0")
         wait_for(browser, "window.ready === true")
         yield browser, folder
     server.shutdown()
@@ -120,6 +120,9 @@ def test_the_page_is_small_and_a_drag_of_the_mouse_pushes_the_robot(
         )  # fmt: skip
     ((px, py, pz),) = value(browser, "window.pushes")
     assert 0.02 < math.hypot(px, py) <= 1.2 and abs(pz) < 1e-9
+    value(browser, "document.getElementById('push').click()")
+    assert value(browser, "window.pushes[1]") == [0.7, 0.0, 0.0], "the paper's push, ahead"
+    assert value(browser, f"{speed}.options[3].text") == "0.7 x real time", "the address's speed"
     value(browser, f"{speed}.value = '1'")
     wait_for(browser, "document.getElementById('verdict').textContent !== ''", 300.0)
     said = value(browser, "document.getElementById('verdict').textContent")

@@ -121,8 +121,9 @@ def _level(
         into = _port(nodes[target], link.target, prefix, False, link.source)
         item = link.row
         shown = DiagramWire(
-            (source, out), (target, into), item.delay, item.truth, item.transition, item.source
-        )
+            (source, out), (target, into), item.delay, item.truth,
+            item.transition_of(link.source), item.source,
+        )  # fmt: skip
         wires.setdefault(shown)
     for path, mine in inner.items():
         if path not in closed:

@@ -6,6 +6,7 @@ the gaps between columns, and lead back below all blocks.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from .diagram import INTO, OUT, Diagram, DiagramNode, DiagramWire
@@ -85,6 +86,20 @@ def note_of(wire: DiagramWire) -> str:
     if selected and not wire.wire_text.startswith(("[", "{")):
         notes.append(selected)
     return " ".join(notes)
+
+
+def note_at(wires: Iterable[DiagramWire]) -> str:
+    """Return the label of an input that these wires lead to: what each of them says, once."""
+    return ", ".join(dict.fromkeys(filter(None, map(note_of, wires))))
+
+
+def notes_of(drawing: Drawing) -> dict[tuple[float, float], str]:
+    """Return the labels of a drawing by the points where their wires end."""
+    ends: dict[tuple[float, float], list[DiagramWire]] = {}
+    for line in drawing.lines:
+        if line.ends:
+            ends.setdefault(line.points[-1], []).append(line.wire)
+    return {point: note for point, wires in ends.items() if (note := note_at(wires))}
 
 
 def size_of(node: DiagramNode) -> tuple[float, float]:
@@ -246,7 +261,10 @@ def column_gaps(router: Router) -> list[float]:
         outside = number in (0, len(router.gaps) - 1)
         least = 16.0 if outside and not gap else 30.0
         ends = [w for hop in gap.values() for _, w in hop.ends if w is not None and router.ends(w)]
-        notes = max((width_of(note_of(w), NOTE) for w in ends), default=0.0)
+        inputs: dict[tuple[str, str], list[DiagramWire]] = {}
+        for wire in ends:
+            inputs.setdefault(wire.target, []).append(wire)
+        notes = max((width_of(note_at(each), NOTE) for each in inputs.values()), default=0.0)
         widths.append(max(least, 28.0 + TRACK * count + notes))
     return widths
 

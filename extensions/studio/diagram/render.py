@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from .diagram import INTO, OUT, Diagram, DiagramNode, DiagramWire
-from .layout import HEAD, NOTE, PAD, PORT, TITLE, USE, Box, Drawing, note_of, width_of
+from .layout import HEAD, NOTE, PAD, PORT, TITLE, USE, Box, Drawing, notes_of, width_of
 
 LIGHT = {
     "page": "#ffffff", "text": "#1b1f24", "soft": "#5b6470", "edge": "#4a5260", "box": "#f3f5f8",
@@ -188,14 +188,11 @@ def _content(drawing: Drawing, style: Style) -> Iterator[str]:
     for box in drawing.boxes.values():
         if box.inside is None and box.node.path not in (INTO, OUT):
             yield from _block(box, style)
-    for line in drawing.lines:
-        note = note_of(line.wire)
-        if note and line.ends:
-            x, y = line.points[-1]
-            yield (
-                f'<text class="soft note" x="{x - 9:g}" y="{y - 4:g}" font-size="{NOTE}" '
-                f'text-anchor="end">{escape(note)}</text>'
-            )
+    for (x, y), note in notes_of(drawing).items():
+        yield (
+            f'<text class="soft note" x="{x - 9:g}" y="{y - 4:g}" font-size="{NOTE}" '
+            f'text-anchor="end">{escape(note)}</text>'
+        )
 
 
 def _classes(wire: DiagramWire, style: Style) -> str:
@@ -359,10 +356,8 @@ class _Painter:
         for box in drawing.boxes.values():
             if box.inside is None and box.node.path not in (INTO, OUT):
                 self.block(box, x, y)
-        for line in drawing.lines:
-            if line.ends and note_of(line.wire):
-                a, b = line.points[-1]
-                self.text(x + a - 9, y + b - 4, note_of(line.wire), NOTE, "soft", "right")
+        for (a, b), note in notes_of(drawing).items():
+            self.text(x + a - 9, y + b - 4, note, NOTE, "soft", "right")
 
     def line(self, xs: list[float], ys: list[float], wire: DiagramWire) -> None:
         dashes: Any = (0, (5, 3)) if wire.delay else (0, (1.5, 2)) if wire.truth else "-"

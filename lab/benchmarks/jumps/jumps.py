@@ -102,7 +102,7 @@ def jumps(
             for s in seeds
         ]
     under = f"{trial} trial" + (f", pushed by {push:g} N s" if push else "")
-    return [*_plan_rows(tasks, plans, seed), _compiling_row(compiling), _landing_row(found, under)]
+    return [*_plan_rows(tasks, plans, seed), _deriving_row(compiling), _landing_row(found, under)]
 
 
 def compile_functions(tasks: Sequence[JumpTask], robot: RobotDescription) -> float:
@@ -192,9 +192,9 @@ def _plan_rows(tasks: Sequence[JumpTask], plans: Sequence[Outcome], seed: int) -
     ]  # fmt: skip
 
 
-def _compiling_row(seconds: float) -> Row:
+def _deriving_row(seconds: float) -> Row:
     return Row(
-        "random jumps, compiling the planner's functions once on a machine, CPU", seconds, "s",
+        "random jumps, deriving the planner's functions once on a machine, CPU", seconds, "s",
         note="not in the times of planning; next to nothing where they are kept already",
     )  # fmt: skip
 

@@ -292,6 +292,17 @@ class _WireComposer:
         shape = draft.shape(field)
         if shape is None:
             return None  # a dimension is not known, which is reported
+        if 0 in shape:
+            self._report(
+                f"{wire_text(item.plain())} has no elements with this robot",
+                item.where,
+                other=wire.source,
+                other_where=draft.flat.where,
+                expected="at least one number",
+                found=f"{field.describe()} = {list(shape)}",
+                fix="leave the wire out, or the block that reads it",
+            )
+            return None
         names = self.names.get(str(field.shape[0]), ()) if field.shape else ()
         try:
             places = select(Selection("", item.selection.indices), shape, names)

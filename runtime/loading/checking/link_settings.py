@@ -7,10 +7,13 @@ from collections.abc import Iterable
 from ....files.nodes import Entry, MapNode
 from ....files.problems import Code, Position, Problems, listing, nearest
 from ...language.flat_graph import FlatGraph
-from ...language.stages import CheckedGraph, LinkPolicy, LinkSettings
+from ...language.stages import LEASE, PATIENCE, CheckedGraph, LinkPolicy, LinkSettings
 from ...placement.age import worst_age
 from ...placement.placed import PlacementError, command_sources, silence_limit
 from ..reading.graph_file import LinkKeys, Links, keys_of, read_section
+
+LEAST_LEASE = 0.1
+"""The shortest lease [s]: a transport gives several signs of life in it."""
 
 
 def read_link_settings(graph: FlatGraph, clock: str, problems: Problems) -> LinkSettings:
@@ -61,7 +64,23 @@ def read_link_settings(graph: FlatGraph, clock: str, problems: Problems) -> Link
                 expected="block.output -> block.input",
                 found=entry.key,
             )
-    return LinkSettings(mode, policy, of, given.get("paths", {}), given.get("watchdog"))
+    lease, patience = given.get("lease", LEASE), given.get("patience", PATIENCE)
+    if lease < LEAST_LEASE or patience < lease:
+        key, least = ("lease", LEAST_LEASE) if lease < LEAST_LEASE else ("patience", lease)
+        entry = graph.links.get(key) or graph.links.get("lease")
+        problems.add(
+            Code.MACHINE,
+            "a machine would be taken for gone between two signs of life"
+            if key == "lease"
+            else "a part would stop waiting for a machine before that is taken for gone",
+            graph.links.where if entry is None else entry.value.where,
+            at=f"links.{key}",
+            expected=f"at least {least:g} s",
+            found=f"{given.get(key, patience):g} s",
+            fix=f"{key}: {least:g} s",
+        )
+    paths, watchdog = given.get("paths", {}), given.get("watchdog")
+    return LinkSettings(mode, policy, of, paths, watchdog, lease, patience)
 
 
 def check_watchdog(checked: CheckedGraph, graph: FlatGraph, problems: Problems) -> None:

@@ -177,6 +177,14 @@ class ClockKeys(_Keys):
     hangs_after: Seconds = _key("the time after which a call of a block is taken to hang")
 
 
+class RecordingKeys(_Keys):
+    """Keys of the recorder."""
+
+    ring_bytes: Annotated[int, Field(ge=1 << 16, le=1 << 36, strict=True)] = _key(
+        "the largest ring between run and recorder, in bytes: 67108864"
+    )
+
+
 class LinkKeys(_Keys):
     """Keys of the policy on late messages."""
 
@@ -192,6 +200,8 @@ class Links(LinkKeys):
     of: dict[str, LinkKeys] = _key("the links of single blocks, by block")
     paths: dict[str, Seconds] = _key("the largest age by path: robot.imu -> robot.command: 4 ms")
     watchdog: Seconds = _key("how long a link that brings commands may be silent: 15 ms")
+    lease: Seconds = _key("the silence after which a machine is taken for gone: 3 s")
+    patience: Seconds = _key("how long a part in lockstep waits for a message: 30 s")
 
 
 class GraphValues(_Keys):
@@ -228,6 +238,7 @@ class GraphSections(_Keys):
 
     dimensions: dict[str, Annotated[int, Field(ge=1)]] = _key("sizes by name")
     clock: ClockKeys = _key("how the run is paced")
+    recording: RecordingKeys = _key("how the run is recorded")
     machines: dict[str, str] = _key("machines that share the graph: name and endpoint")
     place: dict[str, str] = _key("block or sub-graph: machine; wins over 'on'")
     links: Links = _key("how the machines keep together")

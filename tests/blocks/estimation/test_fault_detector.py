@@ -254,7 +254,7 @@ def test_a_slope_and_a_bump_are_no_gross_error(tilt):
 
 
 def test_gravity_is_judged_in_the_stand_and_at_rest_only():
-    standing = Standing(gross_rate=0.0)
+    standing = Standing(gross_rate=0.0, gross_push=0.0, suspects_end=False)
     standing.bench.step(3)
     standing.bench.set("imu", specific_force=0.0)
     for phase in (Phase.SQUAT, Phase.FLIGHT, Phase.RECOVER):
@@ -287,7 +287,9 @@ def test_a_gyroscope_that_turns_otherwise_than_the_base_ends_the_run(axis, facto
     assert ended_by(standing, 6) == (6, "")
     standing.bench.set("imu", angular_velocity=factor * rate)
     ticks, reason = ended_by(standing)
-    assert ticks == 4, "lateness and gross_time are borne"
+    assert ticks == (4 if factor < 0 else 1), (
+        "lateness and gross_time are borne, of a large error less"
+    )
     assert reason.startswith(f"{standing.bench.block.context.path}: the gyroscope's axis")
     assert looks in reason
 
@@ -307,3 +309,80 @@ def test_gross_errors_are_not_judged_where_their_limit_is_zero():
     standing = Standing(gross_gravity=0.0, gross_rate=0.0)
     standing.bench.set("imu", specific_force=-standing.gravity, angular_velocity=5.0)
     assert ended_by(standing) == (50, "")
+
+
+@pytest.mark.parametrize("phase", [Phase.SQUAT, Phase.THRUST])
+@pytest.mark.parametrize(
+    ("factor", "looks"),
+    [(0.102, "it looks like g in place of m/s^2"), (-1.0, "its sign looks wrong")],
+)
+@pytest.mark.parametrize("name", ["bruce", "go2"])
+def test_an_accelerometer_that_goes_wrong_in_squat_or_thrust_ends_the_run(
+    name, phase, factor, looks
+):
+    standing = Standing(name)
+    standing.bench.set("phase", phase=phase)
+    assert ended_by(standing) == (50, "")
+    # the legs push twice the weight, and the base is that much heavier
+    standing.bench.set("load", force=2.0 * standing.robot.weight / len(standing.robot.feet))
+    standing.bench.set("imu", specific_force=2.0 * standing.gravity)
+    assert ended_by(standing, 5) == (5, "")
+    standing.bench.set("imu", specific_force=factor * 2.0 * standing.gravity)
+    ticks, reason = ended_by(standing)
+    assert ticks == 4 and "m/s^2 while the legs push (" in reason and looks in reason
+    assert standing.bench.block.metrics()["stopped_for"] == "push"
+
+
+def test_light_feet_and_the_stand_are_not_judged_by_their_push():
+    for phase, load in ((Phase.THRUST, 0.4), (Phase.STAND, 1.0)):
+        standing = Standing(gross_gravity=0.0, acceleration_error=0.0)
+        standing.bench.set("phase", phase=phase)
+        standing.bench.set("load", force=load * standing.robot.weight / 2)
+        standing.bench.set("imu", specific_force=0.102 * standing.gravity)
+        assert ended_by(standing) == (50, "")
+
+
+def test_no_jump_is_made_with_a_suspect_but_an_encoder():
+    standing = Standing()
+    standing.bench.set("imu", angular_velocity=[0.0, 0.3, 0.0])
+    assert standing.run()[0] == Suspect.GYROSCOPE
+    assert ended_by(standing) == (50, "")  # it stands
+    standing.bench.set("phase", phase=Phase.SQUAT)
+    ticks, reason = ended_by(standing)
+    assert ticks == 0 and "no jump with what is suspected: the gyroscope's axis y" in reason
+    assert standing.bench.block.metrics()["stopped_for"] == "suspect"
+    standing = Standing(suspects_end=False)
+    standing.bench.set("phase", phase=Phase.THRUST)
+    standing.bench.set("imu", angular_velocity=[0.0, 0.3, 0.0])
+    standing.run()
+    assert ended_by(standing) == (50, "")
+
+
+def test_a_jump_goes_on_with_an_encoder_that_slipped():
+    standing = Standing()
+    standing.bench.set("phase", phase=Phase.SQUAT)
+    standing.bench.step()
+    position = np.array(standing.robot.standing_position)
+    position[3] += 0.1
+    standing.bench.set("joints", position=position)
+    assert ended_by(standing) == (50, "") and standing.state.suspect == Suspect.ENCODER
+
+
+@pytest.mark.parametrize("phase", [Phase.STAND, Phase.THRUST, Phase.FLIGHT, Phase.LANDING])
+def test_a_rate_that_no_gyroscope_reads_ends_the_run_at_once(phase):
+    standing = Standing()
+    standing.bench.set("phase", phase=phase)
+    standing.bench.set("imu", angular_velocity=[0.0, 155.6, 0.0])
+    ticks, reason = ended_by(standing)
+    assert ticks == 0 and "the gyroscope's axis y reads +155.60 rad/s" in reason
+    standing = Standing(largest_rate=0.0, gross_rate=0.0)
+    standing.bench.set("phase", phase=phase)
+    standing.bench.set("imu", angular_velocity=[0.0, 155.6, 0.0])
+    assert standing.state.stop == Stop.NONE
+
+
+def test_a_large_error_of_the_gyroscope_counts_three_times():
+    for rate, ticks in ((1.0, 4), (1.5, 1)):  # gross_rate is 0.4 rad/s
+        standing = Standing()
+        standing.bench.set("imu", angular_velocity=[0.0, rate, 0.0])
+        assert ended_by(standing)[0] == ticks

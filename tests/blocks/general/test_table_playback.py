@@ -157,3 +157,22 @@ def test_a_graph_with_a_table_runs_to_its_end() -> None:
     assert result.signal("played.y.value")[:, 0].tolist() == pytest.approx(
         [1.0, 1.2, 1.4, 1.6, 1.8]
     )
+
+
+@pytest.mark.parametrize(
+    ("duration", "from_first", "said"), [(2.0, False, 1), (60.0, False, 0), (2.0, True, 0)]
+)
+def test_a_run_that_ends_before_the_first_time_is_told_so(
+    duration: float, from_first: bool, said: int
+) -> None:
+    text = "rate: 10 Hz\nblocks:\n  t: {use: blocks.TablePlayback, with: {columns: [x], rows: [[52, 1], [53, 2]]}}\n"
+    result = aloft.load(text, {"t.from_first": from_first}).run(duration=duration)
+    told = [w for w in result.block_warnings if "only its first row was played" in w]
+    assert len(told) == said
+    if said:
+        assert told == [
+            (
+                "t: the first time of the table is 52 s, and the run ended after 2 s: only its first row was played; "
+                "for times of day: from_first: true"
+            )
+        ]

@@ -63,3 +63,18 @@ def test_trust_is_by_content(folder: Path) -> None:
     (folder / "thing.fmu").write_bytes(b"another program")
     with pytest.raises(UntrustedCodeError, match=r"before: thing.fmu of b"):
         expect_trusted(code_of(flattened_text(GRAPH, folder / "graph.yaml")), Path("a.rrd"))
+
+
+def test_a_file_that_another_program_laid_there_is_no_trust(folder: Path) -> None:
+    found = code_of(flattened_text(GRAPH, folder / "graph.yaml"))
+    remember(found[:1])
+    kept = folder / "cache/aloft/trusted"
+    (kept / found[1].digest).write_bytes(
+        (kept / found[0].digest).read_bytes()
+    )  # under another name
+    (kept / found[2].digest).touch(mode=0o600)
+    with pytest.raises(UntrustedCodeError, match=r"thing.fmu of b.*made of c"):
+        expect_trusted(found[:3], Path("a.rrd"))
+    kept.chmod(0o777)  # anybody may write there
+    with pytest.raises(UntrustedCodeError, match="own:A of a"):
+        expect_trusted(found[:1], Path("a.rrd"))

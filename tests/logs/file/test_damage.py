@@ -1,7 +1,6 @@
 """Damaged recordings: every changed byte is found, nothing aborts, and the rest is kept."""
 
 from pathlib import Path
-from zlib import crc32
 
 import numpy as np
 import pytest
@@ -9,17 +8,8 @@ import pytest
 from aloft.blocks.general.sources import Constant
 from aloft.logs import RecordingError, read
 from aloft.logs.file.header import header_of
-from aloft.logs.file.index import FOOTER_END
-from aloft.logs.file.messages import (
-    CLOSING,
-    FILE_HEAD,
-    HEAD,
-    Content,
-    DamagedError,
-    _checked,
-    table_of,
-)
-from aloft.logs.file.repair import repair
+from aloft.logs.file.records import Content, DamagedError
+from aloft.logs.recording.repair import repair
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.running.memory import BoundGraph, Snapshot
 from aloft.runtime.running.sink import Note
@@ -81,37 +71,23 @@ def test_a_changed_byte_anywhere_is_found(whole: Path, tmp_path: Path) -> None:
     expect_found(whole, tmp_path, places, rng.integers(0, 8, len(places)))
 
 
-def test_no_message_is_taken_for_intact_with_any_of_its_bytes_changed(whole: Path) -> None:
-    """Every byte of every message, which is what a file is made of but for its first and last bytes."""
-    data, scan = whole.read_bytes(), read(whole).scan
-    assert FILE_HEAD + sum(message.size for message in scan.messages) == scan.end
-    assert scan.closed and data.endswith(FOOTER_END)
-    for number, message in enumerate(scan.messages):
-        known = crc32(data[:FILE_HEAD]) if number == 0 else 0
-        taken = bytearray(data[message.place : message.end])
-        for place in range(len(taken)):
-            taken[place] ^= 1 << place % 8
-            head, body = bytes(taken[: HEAD.size]), bytes(taken[HEAD.size :])
-            assert _checked(message.place, head, body, known) is None, (number, place)
-            taken[place] ^= 1 << place % 8
-        again = _checked(message.place, bytes(taken[: HEAD.size]), bytes(taken[HEAD.size :]), known)
-        assert again == message
-
-
-def test_a_changed_head_of_the_last_message_is_found(whole: Path, tmp_path: Path) -> None:
-    """With a greater length it looks like a message that was cut short."""
-    last = read(whole).scan.messages[-1]
-    places = np.arange(last.place, last.place + HEAD.size)
-    expect_found(whole, tmp_path, np.repeat(places, 8), np.tile(np.arange(8), HEAD.size))
+def test_every_byte_of_the_heads_and_of_the_end_is_looked_at(whole: Path, tmp_path: Path) -> None:
+    """Of all others, ``test_a_changed_byte_anywhere_is_found`` takes some."""
+    scan = read(whole).scan
+    heads = [np.arange(record.place, record.place + 70) for record in scan.of(Content.ROWS)[:1]]
+    first, second = scan.of(Content.END)
+    ends = [np.arange(first.place - 5, second.end + 10)[::5], np.arange(scan.size - 20, scan.size)]
+    places = np.concatenate([*heads, *ends])
+    expect_found(whole, tmp_path, places, places % 8)
 
 
 def test_a_lost_batch_is_named_and_the_rest_is_kept(whole: Path, tmp_path: Path) -> None:
-    message = read(whole).scan.of(Content.ROWS)[2]
+    before, record, after = read(whole).scan.of(Content.ROWS)[1:4]
     data = bytearray(whole.read_bytes())
-    data[message.place + 300] ^= 4
+    data[record.place + 100] ^= 4
     path = tmp_path / "a.rrd"
     path.write_bytes(data)
-    match = rf"a\.rrd is damaged: bytes {message.place} to {message.end - 1}; of the ticks, those "
+    match = rf"a\.rrd is damaged: bytes {before.end} to {after.place - 1}; of the ticks, those "
     with pytest.raises(
         DamagedError, match=match + "from tick 20 to tick 29 may be lost.*log repair"
     ):
@@ -121,7 +97,7 @@ def test_a_lost_batch_is_named_and_the_rest_is_kept(whole: Path, tmp_path: Path)
     assert run.ticks.tolist() == kept
     assert run.missing_ticks == 10
     done = repair(path)
-    assert len(done.damage) == 1 and abs(done.removed - message.size) < 1000
+    assert len(done.damage) == 1
     mended = read(path)
     assert mended.whole and mended.ticks.tolist() == kept
     assert mended["c.y.value"][:, 0].tolist() == kept
@@ -129,10 +105,9 @@ def test_a_lost_batch_is_named_and_the_rest_is_kept(whole: Path, tmp_path: Path)
 
 
 def test_damage_to_a_picture_loses_no_tick(whole: Path, tmp_path: Path) -> None:
-    pictures = [m for m in read(whole).scan.messages if m.content is Content.PICTURE]
-    message = next(m for m in pictures if m.first == 20)
+    record = read(whole).scan.of(Content.ROWS)[2]
     data = bytearray(whole.read_bytes())
-    data[message.place] ^= 255  # not even its length is known
+    data[record.end + 600] ^= 255
     path = tmp_path / "a.rrd"
     path.write_bytes(data)
     with pytest.raises(DamagedError, match="no tick is lost"):
@@ -142,26 +117,40 @@ def test_damage_to_a_picture_loses_no_tick(whole: Path, tmp_path: Path) -> None:
 
 
 def test_a_missing_message_is_noticed(whole: Path, tmp_path: Path) -> None:
-    message = read(whole).scan.of(Content.ROWS)[1]
+    """Also a whole chunk, with nothing changed around it."""
+    before, record, after = read(whole).scan.of(Content.ROWS)[1:4]
     data = whole.read_bytes()
     path = tmp_path / "a.rrd"
-    path.write_bytes(data[: message.place] + data[message.end :])
-    with pytest.raises(DamagedError, match="messages are missing at byte"):
+    begin, end = before.end + record.gap, record.end + after.gap
+    for some in (data[:begin] + data[end:], data[: record.place] + data[record.end :]):
+        path.write_bytes(some)
+        with pytest.raises(
+            RecordingError, match=r"tick 20 to tick 29 may be lost|left out 10 ticks"
+        ):
+            read(path)
+
+
+def test_exchanged_chunks_are_noticed(whole: Path, tmp_path: Path) -> None:
+    before, first, second, after = read(whole).scan.of(Content.ROWS)[:4]
+    data = whole.read_bytes()
+    places = before.end + first.gap, first.end + second.gap, second.end + after.gap
+    one, two = data[places[0] : places[1]], data[places[1] : places[2]]
+    path = tmp_path / "a.rrd"
+    path.write_bytes(data[: places[0]] + two + one + data[places[2] :])
+    with pytest.raises(DamagedError, match="no tick is lost"):
         read(path)
+    rest = read(path, damaged=True)
+    assert rest.rows.tobytes() == written_rows(rest.rows.shape[1]).tobytes()
 
 
 def test_any_prefix_is_useful(whole: Path, tmp_path: Path) -> None:
     data, scan = whole.read_bytes(), read(whole).scan
     path = tmp_path / "a.rrd"
     begun = scan.of(Content.START)[-1].end
-    # Sixteen zeros close a file, and stand inside of messages too.
-    before_a_close = range(begun + len(CLOSING), len(data))
-    seem_closed = [size for size in before_a_close if data.endswith(CLOSING, 0, size)]
-    assert len(seem_closed) > 10
-    for size in [*range(begun, len(data), 997), *seem_closed]:
+    for size in [*range(begun, len(data), 997), *range(len(data) - 3000, len(data), 151)]:
         path.write_bytes(data[:size])
         run = read(path)
-        there = [m.last + 1 for m in scan.of(Content.ROWS) if m.end <= size]
+        there = [record.last + 1 for record in scan.of(Content.ROWS) if record.end <= size]
         assert len(run.ticks) == max(there, default=0), size
         assert not run.whole
 
@@ -186,15 +175,9 @@ def test_packed_rows_are_handed_to_rerun_without_an_object_a_byte() -> None:
     much."""
     import time
 
-    from aloft.logs.recording.writer import _bytes
+    from aloft.logs.recording.record_stream import as_arrow
 
     data = bytes(range(256)) * 16384
     began = time.process_time()
-    assert _bytes(data).to_numpy().tobytes() == data
+    assert as_arrow(data).to_numpy().tobytes() == data
     assert time.process_time() - began < 0.5
-
-
-@pytest.mark.parametrize("body", [b"\x80" * 1_000_000, b"\x08" + b"\xff" * 30, b"\x12\xff\x01a"])
-def test_numbers_without_an_end_are_no_table(body: bytes) -> None:
-    with pytest.raises(ValueError, match="a message holds no table"):
-        table_of(body)

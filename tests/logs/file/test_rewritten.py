@@ -41,10 +41,19 @@ def rewritten(whole: Path, to: Path, *arguments: str) -> Path:
     return to
 
 
-@pytest.mark.parametrize("how", [["optimize"], ["merge"], ["filter", "--drop-timeline", "t"]])
+@pytest.mark.parametrize(
+    "how",
+    [
+        ["optimize"],
+        ["merge"],
+        ["filter", "--drop-timeline", "t"],
+        ["filter", "--drop-timeline", "tick"],
+        ["filter", "--drop-entity", "/__properties/aloft"],
+    ],
+)
 def test_what_has_everything_is_read(whole: Path, tmp_path: Path, how: list[str]) -> None:
     run, was = read(rewritten(whole, tmp_path / "b.rrd", *how)), read(whole)
-    assert not run.scan.sealed and run.scan.closed
+    assert run.scan.rewritten is not None and run.scan.closed and was.scan.rewritten is None
     assert run.rows.tobytes() == was.rows.tobytes() and run.ticks.tolist() == was.ticks.tolist()
     assert run.notes == was.notes and run.outcome == was.outcome
     assert run.keyframes == (20,) and run.snapshot(20) == was.snapshot(20)
@@ -53,12 +62,13 @@ def test_what_has_everything_is_read(whole: Path, tmp_path: Path, how: list[str]
 @pytest.mark.parametrize(
     ("dropped", "text"),
     [
-        (["--drop-timeline", "tick"], "left out the timeline 'tick'"),
+        (["--drop-entity", "/header"], "left out the header"),
+        (["--drop-entity", "/notes"], "left out 1 records, such as keyframes or notes"),
+        (["--drop-entity", "/outcome"], "left out 1 records"),
         (
             ["--drop-entity", "/rows"],
             "left out 60 ticks, as `rerun rrd split` and `filter` do; it has 0",
         ),
-        (["--drop-entity", "/__properties/aloft"], "not a recording of a run by aloft"),
     ],
 )
 def test_what_lacks_something_is_refused_by_name(

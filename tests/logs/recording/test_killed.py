@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from aloft.logs import RecordingError, read
-from aloft.logs.file.repair import repair
 from aloft.logs.recording.recorder import Recorder
+from aloft.logs.recording.repair import repair
 from aloft.runtime.language.stages import CheckedGraph
 from aloft.runtime.loading import checked_file
 from aloft.runtime.running.executor import Executor

@@ -7,7 +7,6 @@ import pytest
 
 from aloft.blocks.general.arithmetic import Gain
 from aloft.blocks.general.sources import SineWave
-from aloft.logs.file.messages import all_tables
 from aloft.logs.replay.replay import KeptRun, Keyframes, ReplayError, replay
 from aloft.logs.replay.replay_recording import write_replay
 from aloft.runtime.language.stages import CheckedGraph
@@ -21,6 +20,12 @@ def graph(factor: float) -> CheckedGraph:
     return checked_graph({"wave": wave, "gain": gain}, ticks=300)
 
 
+try:
+    from rerun.chunk import RrdReader
+except ImportError:  # Rerun 0.40
+    from rerun.experimental import RrdReader
+
+
 def test_both_are_in_the_file(tmp_path: Path) -> None:
     keyframes = Keyframes(100)
     recorded = KeptRun.of(Executor(graph(2.0), sinks=[keyframes]).run(), keyframes)
@@ -28,7 +33,8 @@ def test_both_are_in_the_file(tmp_path: Path) -> None:
     path = write_replay(tmp_path / "new" / "both.rrd", recorded, done)
     found: dict[str, list[np.ndarray]] = {}
     ticks: dict[str, list[np.ndarray]] = {}
-    for entity, batch in all_tables(path, "/**"):
+    for chunk in RrdReader(path).stream():
+        entity, batch = str(chunk.entity_path), chunk.to_record_batch()
         if "Scalars:scalars" in batch.schema.names:
             values = batch["Scalars:scalars"].flatten().to_numpy().reshape(-1, 2)
             found.setdefault(entity, []).append(values)

@@ -12,6 +12,7 @@ from aloft.logs.viewing.blueprint import (
     blueprint_with,
     layout_beside,
     read_layout,
+    recording_blueprint,
 )
 from aloft.runtime.running.memory import BoundGraph
 
@@ -80,3 +81,25 @@ def test_the_file_beside_the_graph_is_found(header: Header, tmp_path: Path) -> N
     (tmp_path / "view.yaml").write_text(GOOD)
     assert layout_beside(there) == tmp_path / "view.yaml"
     assert layout_beside(replace(header, source="")) is None
+
+
+LOOP = """
+rate: 100 Hz
+duration: 1 s
+blocks:
+  wish: {use: blocks.Step, with: {after: 1 m}}
+  error: {use: blocks.Sum, with: {weights: [1, -1]}, in: {a: wish.y, b: {from: place.y, delay: 1}}}
+  rate: {use: blocks.Gain, with: {gain: 3 1/s}, in: {u: [error.y]}}
+  place: {use: blocks.Integrator, in: {u: rate.y}}
+"""
+
+
+def test_signals_of_a_graph_without_a_robot_fill_the_window(tmp_path: Path) -> None:
+    own = header_of(BoundGraph(load(LOOP, path=tmp_path / "loop.yaml").checked))
+    root = recording_blueprint(own).root_container
+    tabs, below = root.contents
+    assert (type(root).__name__, root.row_shares) == ("Vertical", [5, 1])
+    assert [view.name for view in tabs.contents[0].contents] == [
+        "wish.y.value [m]", "error.y.value [m]", "rate.y.value [m/s]", "place.y.value [m]",
+    ]  # fmt: skip
+    assert [view.name for view in below.contents] == ["Events"]

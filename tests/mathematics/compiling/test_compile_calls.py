@@ -50,7 +50,7 @@ def test_machine_code_computes_the_same_bits(order):
 
 
 def test_threads_that_compile_at_the_same_time_wait_for_each_other(monkeypatch):
-    inside, most, translate = [], [], module.Translator.object_code
+    inside, most, translate = [], [], module.Translator.module
 
     def watched(translator, kernel, signature):
         inside.append(kernel)
@@ -59,7 +59,7 @@ def test_threads_that_compile_at_the_same_time_wait_for_each_other(monkeypatch):
         inside.remove(kernel)
         return code
 
-    monkeypatch.setattr(module.Translator, "object_code", watched)
+    monkeypatch.setattr(module.Translator, "module", watched)
     calls = [KernelCall(ours.mix, *arguments(order)) for order in ("C", "F", "A", "C")]
     said: list[str] = []
     threads = [

@@ -73,6 +73,7 @@ def beyond_the_end(b: Array1D, k: int, y: Array1D, r: Array1D) -> None:
     r[0], r[1] = np.sum(b[3:8]), sum(b[k : k + 9])
     r[2] = (b[2:9] * b[2:9]).max() + b[k + 1 : k + 7] @ b[k + 1 : k + 7]
     r[3] = np.sum(b[k : k + 1] * b[0:3]) + np.sum(np.ones(1) + b)
+    r[0] += np.sum(b[k + 5 : 3]) + b[9:k] @ b[7:k] + np.sum(b[8:] * b[k + 7 : -1])
     r[4] = (b - np.dot(b[:0:-3], b[:0:-3])).max() + np.abs(b * np.sum(b[::-1])).min()
 
 
@@ -251,6 +252,20 @@ def test_slices_that_are_too_short_end_the_run_in_all_tiers(function: Any, most:
         with pytest.raises(IndexError, match="slice of another length than what it is combined"):
             call.run()
         assert y.tolist() == [1.0, 1.0, 1.0]
+
+
+@kernel
+def mean_of_nothing(b: Array1D, k: int, y: Vector3) -> None:
+    y[0] = np.mean(b[k + 2 : 3])
+
+
+def test_the_mean_of_nothing_is_a_division_by_zero() -> None:
+    three(mean_of_nothing, np.arange(6.0), 0, np.zeros(3))
+    call = KernelCall(mean_of_nothing, np.arange(6.0), 3, np.zeros(3))
+    assert compile_calls([call]) == ""
+    for run in (call.run, lambda: mean_of_nothing(*call.arguments)):
+        with pytest.raises(ZeroDivisionError):
+            run()
 
 
 def test_a_slice_that_numpy_would_repeat_ends_the_run() -> None:

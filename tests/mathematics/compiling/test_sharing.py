@@ -12,6 +12,7 @@ from aloft.mathematics.compiling import compile_calls as module
 from aloft.mathematics.compiling import sharing, store
 from aloft.mathematics.compiling.arguments import type_of
 from aloft.mathematics.compiling.kernel_call import KernelCall
+from aloft.mathematics.compiling.translate import Translator
 from aloft.mathematics.kernel import kernel
 
 FLOATS = type_of(np.zeros(3))
@@ -22,6 +23,7 @@ pytestmark = pytest.mark.usefixtures("own_cache")
 
 
 def jobs():
+    translator = Translator()
     found = (
         (rotations.multiply, (FLOATS,) * 3),
         (rotations.exponential, (FLOATS,) * 2),
@@ -29,7 +31,7 @@ def jobs():
         (linear_algebra.solve_upper, (MATRIX, FLOATS)),
         (landing_law.keep_within, (FLOATS,) * 4),
     )
-    return [sharing.CompileJob(f"{k:032d}", *job) for k, job in enumerate(found)]
+    return [sharing.CompileJob(f"{k:032d}", translator.module(*job)) for k, job in enumerate(found)]
 
 
 def test_few_kernels_are_not_worth_another_process():
@@ -37,7 +39,7 @@ def test_few_kernels_are_not_worth_another_process():
 
 
 def _size(job):
-    return sum(sharing._code_below(job.kernel).values())
+    return len(job.assembly)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 9])
@@ -50,14 +52,6 @@ def test_every_kernel_is_in_one_share_and_the_shares_are_about_equal(count, monk
     if count == 2:
         first, second = (sum(map(_size, share)) for share in shares)
         assert abs(first - second) < 0.5 * max(first, second)
-
-
-def test_functions_that_a_process_has_already_cost_nothing(monkeypatch):
-    monkeypatch.setattr(sharing, "WORTH_A_PROCESS", 100)
-    twice = [jobs()[1], jobs()[3], jobs()[1]._replace(name="same kernel, other types")]
-    shares = sharing.divide(twice, 2)
-    both = next(share for share in shares if twice[0] in share)
-    assert twice[2] in both
 
 
 def test_another_process_leaves_machine_code_in_the_cache():
@@ -73,13 +67,14 @@ def test_no_process_is_left_behind():
     assert not processes[0].is_alive()
 
 
-def test_what_another_process_cannot_do_is_done_here(monkeypatch):
+def test_what_another_process_does_not_do_is_done_here(monkeypatch):
     @kernel
-    def local(values: np.ndarray) -> None:  # no other process can import it
+    def local(values: np.ndarray) -> None:
         values[0] = 2.0
 
     monkeypatch.setattr(sharing, "WORTH_A_PROCESS", 1)
     monkeypatch.setattr(module, "processors", lambda: 2)
+    monkeypatch.setattr(sharing.pickle, "dumps", lambda jobs: b"nothing that can be read")
     calls = [
         KernelCall(local, np.zeros(3)),
         KernelCall(rotations.multiply, *(np.ones(4) for _ in range(3))),

@@ -75,7 +75,7 @@ def write(module, folder, triple=TRIPLE):
 
 def compiled(call, monkeypatch):
     """How many kernels a call makes the compiler compile."""
-    seen, translate = [], Translator.object_code
+    seen, translate = [], Translator.module
 
     def watched(translator, kernel, signature):
         seen.append(kernel)
@@ -84,7 +84,7 @@ def compiled(call, monkeypatch):
     monkeypatch.setattr(compile_calls, "_loaded", {})
     monkeypatch.setattr(compile_calls, "_names", {})
     with monkeypatch.context() as patch:
-        patch.setattr(Translator, "object_code", watched)
+        patch.setattr(Translator, "module", watched)
         assert compile_calls.compile_calls([call]) == ""
     call.run()
     expected = np.zeros(3)

@@ -86,7 +86,7 @@ def test_gaps_of_legs_fall_below_zero_as_a_hind_foot_passes_a_fore_one(pitch: fl
 def test_a_problem_asks_for_gaps_between_fore_and_hind_legs_in_flight() -> None:
     """Of the standing robot's at most: 20 cm are more than a knee has to the foot behind it."""
     task = {"robot": "go2", "name": "ahead", "rise": 0.1, "distance_x": 0.25, "leg_clearance": 0.2}
-    problem = make_problem(make_task(task).resolved(GO2.robot), GO2.robot, compiled=False)
+    problem = make_problem(make_task(task).resolved(GO2.robot), GO2.robot)
     pairs = fore_and_hind(GO2, problem.coordinates)
     found = problem.row_lower[np.array(problem.families) == "leg clearance"]
     sides = len(body_points(GO2, problem.coordinates))

@@ -191,7 +191,7 @@ def test_knees_keep_off_the_ground_also_at_the_end() -> None:
     """Where only the base is given: the last knot has no interval, and its joints are free."""
     for robot, watched in ((find_robot("go2"), True), (ROBOT, False)):
         task = make_task({"name": "up", "robot": robot.name, "rise": 0.1})
-        last = make_problem(task, robot, compiled=False).assembly.knots[-1]
+        last = make_problem(task, robot).assembly.knots[-1]
         assert ("obstacle" in last.pieces) is watched
 
 
@@ -219,7 +219,7 @@ def test_a_base_on_legs_that_fold_stays_above_what_counts_as_a_fall() -> None:
                 "landing_height": 0.1,
             }
         ).resolved(robot)
-        problem = make_problem(task, robot, compiled=False)
+        problem = make_problem(task, robot)
         height = problem.coordinates.free_base.index(2)
         lows = {problem.phase_at(k).phase: problem.lower[problem.assembly.state_start[k] + height]
                 for k in range(2, problem.knots - 1)}  # fmt: skip

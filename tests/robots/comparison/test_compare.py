@@ -125,3 +125,17 @@ def test_a_body_that_mujoco_refuses_counts_as_it_is_written(tmp_path: Path) -> N
     mujoco = read(tmp_path / "robot.urdf").compared[0]
     assert "MuJoCo refuses a body of the file, whose written numbers count" in mujoco.named
     assert not mujoco.why and mujoco.largest < 1e-9
+
+
+def test_a_joint_without_a_limit_is_compared_and_nothing_is_printed(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    limit = '<limit lower="-2" upper="2" effort="20" velocity="5"/>'
+    assert ARM.count(limit) == 1
+    made = imported(tmp_path, ARM.replace(limit, ""))
+    mujoco, pinocchio = made.compared()
+    assert not pinocchio.why and pinocchio.compared >= 9
+    kinds = ["a joint of a URDF without lower and upper limit turns freely"]
+    assert [*pinocchio.named] == kinds and not mujoco.named
+    assert any("has no lower and upper limit in the URDF" in note for note in made.notes)
+    assert capfd.readouterr().err == ""

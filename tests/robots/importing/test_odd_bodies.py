@@ -63,3 +63,10 @@ def test_a_body_without_a_joint_has_no_need_of_a_mirror_image(tmp_path: Path) ->
     assert notes(tmp_path, head=head) == [
         "bodies without a joint are part of what carries them: head (0.8 kg, part of torso)"
     ]
+
+
+def test_a_robot_with_two_limbs_and_no_free_joint_is_said_to_be_bolted(tmp_path: Path) -> None:
+    assert notes(tmp_path) == []
+    path = tmp_path / "robot.xml"
+    path.write_text(path.read_text().replace("<freejoint/>", ""))
+    assert "torso has no free joint, so it is bolted to the world" in read(path).notes

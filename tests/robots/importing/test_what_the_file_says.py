@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -231,3 +232,90 @@ def test_a_thing_beside_the_robot_is_no_second_robot(tmp_path: Path) -> None:
     found = read_text(tmp_path, HELD.replace("</worldbody>", ball))
     assert found.description.base == "trunk"
     assert "left out: bodies beside the robot: ball" in found.notes
+
+
+def test_parts_whose_inertia_no_body_has_are_named(tmp_path: Path) -> None:
+    links = "".join(
+        LINK.format(name=name, mass=1, more="") for name in ("trunk", "thigh", "camera")
+    )
+    fixed = '<joint name="mount" type="fixed"><parent link="thigh"/><child link="camera"/></joint>'
+    hip = JOINT.format(name="hip", parent="trunk", child="thigh", more="")
+    text = f'<robot name="r">{links}{hip}{fixed}</robot>'
+    assert not any("none that a body has" in note for note in read_text(tmp_path, text).notes)
+    camera = text.index('name="camera"')
+    odd = text[:camera] + text[camera:].replace('ixx="0.002"', 'ixx="0.005"', 1)
+    assert (
+        "inertias of camera, which no joint moves, are none that a body has; they count as they are written"
+        in read_text(tmp_path, odd).notes
+    )
+
+
+def test_shapes_of_a_link_without_an_inertial_weigh_nothing_and_it_is_said(tmp_path: Path) -> None:
+    box = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
+    links = "".join(LINK.format(name=name, mass=1, more=box) for name in ("trunk", "thigh"))
+    fixed = '<joint name="mount" type="fixed"><parent link="thigh"/><child link="camera"/></joint>'
+    hip = JOINT.format(name="hip", parent="trunk", child="thigh", more="")
+    text = f'<robot name="r">{links}<link name="camera">{box}</link>{hip}{fixed}</robot>'
+    found = read_text(tmp_path, text)
+    assert found.description.total_mass == pytest.approx(2.0)
+    assert (
+        "links camera have shapes for collisions and no <inertial>: they weigh nothing here, and MuJoCo would weigh the shapes"
+        in found.notes
+    )
+
+
+def test_a_joint_with_one_limit_has_zero_as_the_other(tmp_path: Path) -> None:
+    links = "".join(LINK.format(name=name, mass=1, more="") for name in ("trunk", "thigh"))
+    hip = JOINT.format(name="hip", parent="trunk", child="thigh", more="")
+    hip = hip.replace('lower="-1" ', "")
+    text = f'<robot name="r">{links}{hip}</robot>'
+    found = read_text(tmp_path, text)
+    assert found.description.joints[0].limits == (0.0, 1.0)
+    assert (
+        "joint hip has one limit in the URDF; the other is zero, as in the format: 0 to 1"
+        in found.notes
+    )
+
+
+@pytest.mark.parametrize("declared", ["", '<link name="world"/>'])
+def test_a_robot_that_hangs_from_the_world_is_fixed_declared_or_not(
+    declared: str, tmp_path: Path
+) -> None:
+    links = "".join(LINK.format(name=name, mass=1, more="") for name in ("base", "arm"))
+    weld = '<joint name="weld" type="fixed"><parent link="world"/><child link="base"/></joint>'
+    hinge = JOINT.format(name="hinge", parent="base", child="arm", more="")
+    found = read_text(tmp_path, f'<robot name="r">{declared}{links}{weld}{hinge}</robot>')
+    assert found.description.base_joint == "fixed"
+    assert [joint.name for joint in found.description.joints] == ["hinge"]
+    said = any("which the URDF does not declare: it is the ground" in note for note in found.notes)
+    assert said == (not declared)
+
+
+def test_feet_are_guessed_on_the_same_place_of_both_legs(tmp_path: Path) -> None:
+    def leg(side: str, y: float, parts: tuple[str, str]) -> str:
+        links = "".join(
+            LINK.format(name=f"{side}_{name}", mass=1, more="") for name in ("thigh", "shin")
+        )
+        hip = JOINT.format(name=f"{side}_hip", parent="trunk", child=f"{side}_thigh", more="")
+        knee = JOINT.format(
+            name=f"{side}_knee", parent=f"{side}_thigh", child=f"{side}_shin", more=""
+        )
+        text = links + hip.replace("0.1 0 0", f"0 {y} 0") + knee.replace("0.1 0 0", "0 0 -0.3")
+        for part, x in ((part, {"front": 0.1, "rear": -0.05}[part]) for part in parts):
+            text += LINK.format(name=f"{side}_foot_{part}", mass=0.1, more="")
+            text += f'<joint name="{side}_{part}" type="fixed"><parent link="{side}_shin"/><child link="{side}_foot_{part}"/>'
+            text += f'<origin xyz="{x} 0 -0.3"/></joint>'
+        return text
+
+    legs = leg("l", 0.1, ("front", "rear")) + leg("r", -0.1, ("rear", "front"))
+    trunk = LINK.format(name="trunk", mass=5, more="")
+    path = tmp_path / "robot.urdf"
+    path.write_text(f'<robot name="r">{trunk}{legs}</robot>')
+    feet = {foot["at"] for foot in guessed_feet(path)}
+    assert feet == {"l_foot_front", "r_foot_front"}
+
+
+def guessed_feet(path: Path) -> list[dict[str, Any]]:
+    import yaml
+
+    return list(yaml.safe_load(new_yaml(path, path.with_suffix(".yaml")).text)["feet"])

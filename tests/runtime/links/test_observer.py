@@ -119,6 +119,9 @@ def test_late_results_of_a_background_block_are_shown(stack: ExitStack) -> None:
     assert observer.wait_for(tuple(machines), 60.0) == ()
     assert wait_for(lambda: observer.statuses["thinking"]["late_results"] > 10)
     assert observer.statuses["control"]["late_results"] == 0
+    lateness = observer.statuses["thinking"]["lateness"]
+    assert lateness["late_after_us"] == pytest.approx(1000.0)
+    assert 0.0 < lateness["p50_us"] <= lateness["p99_us"] <= lateness["max_us"]
 
 
 def test_over_tls_an_observer_sees_and_a_stranger_does_not(

@@ -21,8 +21,9 @@ def rows(source: Path | str, *overrides: str) -> dict[str, dict[str, Any]]:
 def test_numbers_lists_and_what_may_be_nothing(graph_file: Path) -> None:
     found = rows(graph_file)
     frequency = found["wave.frequency"]
-    assert (frequency["kind"], frequency["unit"], frequency["bounds"]) == ("number", "Hz", "")
-    assert (frequency["low"], frequency["high"]) == (-2.0, 6.0)
+    assert (frequency["kind"], frequency["unit"], frequency["bounds"]) == ("number", "Hz", "≥ 0")
+    assert (frequency["low"], frequency["high"]) == (0.0, 6.0)
+    assert found["wave.amplitude"]["bounds"] == "" and found["wave.amplitude"]["low"] < 0.0
     assert frequency["start"] == frequency["value"] == 2.0
     assert frequency["place"] == f"{graph_file}:8:7"
     assert (frequency["block"], frequency["name"]) == ("wave", "frequency")

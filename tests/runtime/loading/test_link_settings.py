@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from aloft.runtime.language.stages import LinkPolicy, LinkSettings
+from aloft.runtime.language.stages import LEASE, PATIENCE, LinkPolicy, LinkSettings
 from aloft.runtime.loading import LoadError, checked_text
 
 PATH = Path("graph.yaml")
@@ -51,3 +51,38 @@ def test_what_is_watched() -> None:
         with pytest.raises(LoadError) as caught:
             settings(text)
         assert expected in caught.value.report.problems[0].message
+
+
+def test_lease_and_patience() -> None:
+    found = settings("")
+    assert (found.lease, found.patience) == (LEASE, PATIENCE) == (3.0, 30.0)
+    found = settings("links: {lease: 500 ms, patience: 2 s}")
+    assert (found.lease, found.patience) == (0.5, 2.0)
+    for text, message, expected, found_text, fix in [
+        (
+            "links: {lease: 50 ms}",
+            "between two signs of life",
+            "at least 0.1 s",
+            "0.05 s",
+            "lease: 0.1 s",
+        ),
+        (
+            "links: {patience: 1 s}",
+            "stop waiting for a machine before",
+            "at least 3 s",
+            "1 s",
+            "patience: 3 s",
+        ),
+        (
+            "links: {lease: 60 s}",
+            "stop waiting for a machine before",
+            "at least 60 s",
+            "30 s",
+            "patience: 60 s",
+        ),
+    ]:
+        with pytest.raises(LoadError) as caught:
+            settings(text)
+        (problem,) = caught.value.report.problems
+        assert message in problem.message
+        assert (problem.expected, problem.found, problem.fix) == (expected, found_text, fix)

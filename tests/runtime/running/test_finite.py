@@ -1,5 +1,8 @@
 """The finite check: silent on every finite number, exact about the first that is not."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -50,3 +53,26 @@ def test_finite_numbers_of_any_size_pass(size: float) -> None:
 
 def test_a_region_without_floats_passes() -> None:
     FiniteCheck(Region(Layout.of([]))).check()
+
+
+def test_numpy_does_not_warn_of_what_is_found() -> None:
+    text = """if True:
+    import numpy as np
+    from aloft.runtime.language.layout import Layout, PortLayout
+    from aloft.runtime.language.signals import Field, Signal
+    from aloft.runtime.running.finite import FiniteCheck, NotFiniteError
+    from aloft.runtime.running.memory import Region
+
+    class Two(Signal):
+        value = Field(2, text="both infinities")
+
+    memory = Region(Layout.of([PortLayout("a.y", Two, {})]))
+    memory.field("a.y.value")[:] = np.inf, -np.inf
+    try:
+        FiniteCheck(memory).check()
+    except NotFiniteError as error:
+        print(error)
+    """
+    command = [sys.executable, "-W", "always", "-c", text]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    assert (done.stdout, done.stderr) == ("a.y.value[0] is inf\n", "")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.runtime.running.plots import nothing_between
 from aloft.runtime.running.run_result import RunResult
 
 GRAPH = """\
@@ -74,9 +75,15 @@ def test_what_is_refused(result: RunResult) -> None:
         result.plot("wave.x.value")
     with pytest.raises(ValueError, match=r"wave\.y\.value\[5\]: "):
         result.plot("wave.y.value[5]")
-    with pytest.raises(ValueError, match="nothing was recorded between 3 s and None s"):
+    with pytest.raises(ValueError, match="nothing was recorded from 3 s on"):
         result.plot("wave.y", start=3)
     with pytest.raises(ValueError, match="name a signal to plot"):
         result.plot()
     with pytest.raises(RuntimeError):
         aloft.load("aloft:jump").run(0.002, log=False).plot("robot.joints")
+
+
+def test_ends_of_time_without_ticks_are_said_in_words() -> None:
+    assert nothing_between(None, None) == "nothing was recorded: there is no tick"
+    assert nothing_between(None, 2.0) == "nothing was recorded until 2 s"
+    assert nothing_between(1.0, 2.5) == "nothing was recorded between 1 s and 2.5 s"

@@ -11,8 +11,8 @@ import pytest
 import zenoh
 
 from aloft.runtime.language.errors import AloftError
-from aloft.runtime.language.stages import MachineSpec
-from aloft.runtime.transports.zenoh_session import LEASE, as_chunk, session_config
+from aloft.runtime.language.stages import LEASE, MachineSpec
+from aloft.runtime.transports.zenoh_session import Limits, as_chunk, session_config
 from aloft.runtime.transports.zenoh_transport import ZenohTransport
 
 from ...waiting import free_port, wait_for
@@ -91,7 +91,14 @@ def test_the_configuration_searches_for_nobody() -> None:
     assert get("scouting/gossip/enabled") is False
     assert get("listen/endpoints") == ["tcp/127.0.0.1:7450"]
     assert get("connect/endpoints") == ["tcp/127.0.0.1:7451"]
-    assert get("transport/link/tx/lease") == LEASE
+    assert get("transport/link/tx/lease") == 1e3 * LEASE
+    config = session_config([], [], limits=Limits(lease=0.25, patience=7.0, largest=1_000_000))
+    assert get("transport/link/tx/lease") == 250
+    control = "transport/link/tx/queue/congestion_control"
+    assert get(f"{control}/block/wait_before_close") == 7_000_000
+    assert get(f"{control}/drop/max_wait_before_drop_fragments") == 1000
+    assert get("transport/link/tx/queue/size/real_time") == 16
+    assert [Limits(largest=size).batches for size in (0, 512, 65_000, 300_000)] == [2, 2, 3, 6]
     assert get("transport/shared_memory/enabled") is False
 
 

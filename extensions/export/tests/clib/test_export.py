@@ -229,6 +229,25 @@ def test_gains_of_a_pid_are_live_and_what_python_computes_from_the_rest_is_fixed
         assert (library.step(), library.outputs["force"].tolist()) == (0, [force])
 
 
+MOTOR = """
+rate: 100 Hz
+blocks:
+  volts: {use: blocks.External, with: {unit: V}}
+  motor:
+    use: blocks.StateSpace
+    with: {a: [[0.9, 0], [0, 0.8]], b: [[1], [1]], c: [[1, 0], [0, 1]], input_units: V, output_units: [A, rad/s]}
+    in: {u: volts.y}
+"""
+
+
+@needs_compiler
+def test_the_header_has_the_unit_of_each_element(tmp_path: Path) -> None:
+    (tmp_path / "motor.yaml").write_text(MOTOR)
+    made = write_library(str(tmp_path / "motor.yaml"), tmp_path / "motor")
+    assert "double motor_y[2]; /* [A, rad/s]: " in (tmp_path / "motor" / "motor.h").read_text()
+    assert made.about["outputs"][0]["units"] == ("A", "rad/s")
+
+
 LATE = MASS.replace("measured: place.y", "measured: {from: place.y, delay: 2}")
 
 
@@ -258,6 +277,8 @@ def test_delays_of_inputs_are_on_the_side_that_is_asked_for_and_said(
     for tick in range(len(place)):
         library.inputs["wish"][...], library.inputs["measured"][...] = wish[tick], late[tick]
         assert (library.step(), library.outputs["force"].tolist()) == (0, [force[tick]])
+    aloft.load(tmp_path / "late.yaml").run(sinks=[Recorder(tmp_path / "late.rrd")])
+    assert not check(made.description, tmp_path / "late.rrd").difference
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import time
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 from random import Random
 
 import pytest
@@ -17,10 +18,29 @@ from aloft.extensions.studio.diagram.diagram import (
     DiagramWire,
     diagram,
 )
-from aloft.extensions.studio.diagram.layout import Drawing, draw, size_of
-from aloft.runtime.loading import checked_file
+from aloft.extensions.studio.diagram.layout import Drawing, draw, notes_of, size_of
+from aloft.runtime.loading import checked_file, checked_text
 
 from .test_layers import NAMES, diagram_of
+
+COMPOSED = """
+rate: 1 kHz
+blocks:
+  fast: {use: blocks.Step, with: {after: 3 V}}
+  slow: {use: blocks.Ramp, with: {slope: 1, unit: V}, rate: 100 Hz}
+  slower: {use: blocks.Ramp, with: {slope: 1, unit: V}, rate: 10 Hz}
+  mixed: {use: blocks.Gain, in: {u: [fast.y, slow.y, slower.y]}}
+  late: {use: blocks.Gain, in: {u: {from: [fast.y, "mixed.y.value[0]"], delay: 7}}}
+"""
+
+
+def test_wires_of_a_composite_input_have_their_own_rates_and_one_label() -> None:
+    found = diagram(checked_text(COMPOSED, Path("graph.yaml")))
+    rates = {w.source[0]: w.transition for w in found.wires if w.target[0] == "mixed"}
+    assert rates == {"fast": "", "slow": "holds 100 Hz", "slower": "holds 10 Hz"}
+    drawing = draw(found)
+    check_drawing(drawing)
+    assert sorted(notes_of(drawing).values()) == ["holds 100 Hz, holds 10 Hz", "z⁻⁷"]
 
 
 def check_drawing(drawing: Drawing) -> None:

@@ -9,8 +9,8 @@ import pytest
 from aloft.blocks.general.sources import Constant
 from aloft.logs import RecordedRun, RecordingError, read
 from aloft.logs.file.header import make_header
-from aloft.logs.file.repair import repair
 from aloft.logs.recording.output_file import unfinished_name
+from aloft.logs.recording.repair import RepairError, repair
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
@@ -52,7 +52,7 @@ def test_all_that_was_flushed_survives_a_cut(
     path, sizes = written
     cut = tmp_path / "cut.rrd"
     cut.write_bytes(path.read_bytes()[: sizes[batch] + beyond])
-    before = read(cut)  # a message that is cut short is none
+    before = read(cut)  # a record that is cut short is none
     check(before, (batch + 1) * BATCH)
     assert not before.whole
     done = repair(cut)
@@ -62,14 +62,14 @@ def test_all_that_was_flushed_survives_a_cut(
     check(run, (batch + 1) * BATCH)
     assert run.outcome is None
     again = repair(cut)
-    assert again.was_whole and again.messages == done.messages
+    assert again.was_whole and again.size == done.size
 
 
 def test_a_whole_file_stays_as_it_is(written: tuple[Path, list[int]]) -> None:
     path, _ = written
     before = path.read_bytes()
     done = repair(path)
-    assert done.closed and done.removed == 0
+    assert done.closed and done.size == done.size_before
     assert path.read_bytes() == before
     check(read(path), BATCHES * BATCH)
 
@@ -79,26 +79,37 @@ def test_what_cannot_be_mended(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"a.rrd is not a recording: it does not begin like"):
         repair(tmp_path / "a.rrd")
     (tmp_path / "a.rrd").write_bytes(b"RRF2" + bytes(8) + b"\1" + bytes(7) + b"\377" + bytes(20))
-    with pytest.raises(RecordingError, match="Rerun cannot read it"):
+    with pytest.raises(RecordingError, match=r"Rerun cannot read it|was cut off before"):
         repair(tmp_path / "a.rrd")
     with pytest.raises(FileNotFoundError):
         repair(tmp_path / "none.rrd")
 
 
-def test_a_full_disk_does_not_hinder(written: tuple[Path, list[int]], tmp_path: Path) -> None:
+def test_a_full_disk_leaves_the_file_as_it_is(
+    written: tuple[Path, list[int]], tmp_path: Path
+) -> None:
     path, sizes = written
     cut = tmp_path / "cut.rrd"
-    data = bytearray(path.read_bytes()[: sizes[-1]])
-    data[sizes[2] + 200] ^= 1
+    data = path.read_bytes()[: sizes[-1]]
     cut.write_bytes(data)
-    size, file = cut.stat().st_size, cut.stat().st_ino
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(data) // 2, limits[1]))
     try:
-        done = repair(cut)
+        with pytest.raises(OSError, match=r"cut\.rrd cannot be written any further"):
+            repair(cut)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    assert len(done.damage) == 1 and cut.stat().st_size < size
-    assert cut.stat().st_ino == file and list(tmp_path.iterdir()) == [cut], "mended in place"
-    ticks = read(cut).ticks
-    assert len(ticks) == (len(sizes) - 1) * BATCH
+    assert cut.read_bytes() == data and list(tmp_path.iterdir()) == [cut]
+    assert len(read(cut).ticks) == len(sizes) * BATCH
+
+
+def test_without_a_header_there_is_nothing_to_save(
+    written: tuple[Path, list[int]], tmp_path: Path
+) -> None:
+    path, _ = written
+    cut = tmp_path / "cut.rrd"
+    data = bytearray(path.read_bytes())
+    data[read(path).scan.records[0].place + 40] ^= 1
+    cut.write_bytes(data)
+    with pytest.raises(RepairError, match="holds no header that is intact"):
+        repair(cut)

@@ -1,0 +1,342 @@
+"""Identification of a robot's dynamics from logs of motion and torque, of whatever robot and by whomever.
+
+The torque that a log has of joint j is taken to be
+
+    u_j(t) = (Y_j b + R_j a_j + C_j s(v_j) + B_j v_j + L_j s(v_j) |Y_j b + R_j a_j|) / k_j + o_j,  t by an age d late,
+
+with the base parameters b (``base_parameters``), rotors R, Coulomb friction C, viscous friction B, friction with load L,
+s(v) = tanh(v / v_0), a torque constant k relative to that with which the log was made, and an offset o. A floating base has six
+equations more, without a torque; forces of standing feet are projected out, and L acts on the measured torque.
+
+Both sides are low-passed in the band that the motors drive (``band``). Unknowns are found by instrumental variables: equations by
+even samples, instruments by odd ones, and the other way round, so noise of the encoders biases nothing. Gauss and Newton's
+iteration, rows weighted by the noise of their joint, those far off less.
+
+What data do not tell stays at the description: each unknown has a prior, wide but for the torque constants, which
+are 1 within ``CONSTANT_STD``. A common factor on all torque constants, inertias and frictions is told by no motion, so it is
+known no better than by these priors, or by a joint whose torque is trusted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ....mathematics.arrays import Array
+from ....robots.robot_description import RobotDescription
+from .band import LowPass, band_of, halves, torque_at
+from .base_parameters import LinkRegressor, Motion
+from .identification import Estimate, IdentificationError
+from .motion_log import MotionLog, missing
+
+SPEED = 0.05
+"""The speed v_0 at which most of the Coulomb friction acts [rad/s, m/s]."""
+CONSTANT_STD, LOAD_STD, AGE_STD = 0.1, 0.1, 0.004
+"""Standard deviations, beforehand, of torque constants, of friction with load, and of the torques' age [s]."""
+LINK_STD = 1.0
+"""That of masses, moments and inertias, relative to the description's sizes."""
+ROUNDS = 8
+TOLD = 2.0
+"""Friction with load of fewer standard deviations from zero is left out."""
+NO_LOAD_STD, TRUSTED_STD = 1e-5, 0.005
+OUTLYING = 2.5
+"""Residuals of more standard deviations count less."""
+CLUSTER = 6.0
+"""Residuals may be correlated for so many periods of the band's end."""
+FEWEST = 40
+"""The fewest instants that are fitted."""
+VARIANTS = ((0.6, 1.0), (1.0, 0.4))
+"""The fit is repeated with these factors on the band and on ``SPEED``, which nothing tells: how far values move belongs
+to their uncertainty."""
+
+
+@dataclass
+class Unknowns:
+    """The places of the unknowns in one vector, with their priors."""
+
+    names: list[str] = field(default_factory=list)
+    mean: list[float] = field(default_factory=list)
+    at: dict[str, slice] = field(default_factory=dict)
+
+    def add(self, kind: str, names: list[str], mean: Array | float) -> None:
+        """Add those of one kind."""
+        start = len(self.names)
+        self.names += [f"{kind} {name}".strip() for name in names]
+        self.mean += np.broadcast_to(mean, (len(names),)).tolist()
+        self.at[kind] = slice(start, len(self.names))
+
+
+@dataclass
+class FormedLog:
+    """The equations of one log: motion and rows by both halves, and the low-passed torque."""
+
+    log: MotionLog
+    low: LowPass
+    motions: tuple[Motion, Motion]
+    rows: tuple[Array, Array]
+    passed: tuple[Array, Array]
+    torque: Array
+    measured: Array
+
+
+@dataclass(frozen=True)
+class FittedDynamics:
+    """What a fit found: the vector of all unknowns, its covariance, and the band [Hz].
+
+    ``noise`` is that of every equation [N m], (n_velocities,); ``prior_std`` what was known beforehand.
+    """
+
+    unknowns: Unknowns
+    value: Array
+    covariance: Array
+    prior_std: Array
+    noise: Array
+    band: float
+    equations: int
+
+    def estimates_at(self, part: slice) -> list[Estimate]:
+        """Return the values at a part of the vector, each with its standard deviation."""
+        std = np.sqrt(np.diag(self.covariance))[part]
+        return [Estimate(float(v), float(s)) for v, s in zip(self.value[part], std, strict=True)]
+
+
+class DynamicsModel:
+    """The equations of a robot and its unknowns."""
+
+    def __init__(self, robot: RobotDescription) -> None:
+        self.robot, self.links = robot, LinkRegressor(robot)
+        self.joints = [joint.name for joint in robot.joints]
+        self.first, n = self.links.first, len(self.joints)
+        self.rotors = np.diag(robot.rotor_matrix).copy()
+        self.unknowns = unknowns = Unknowns()
+        unknowns.add("", self.links.names, self.links.described_base)
+        unknowns.at["base"] = unknowns.at.pop("")
+        told = self.links.told_rotors
+        unknowns.add("rotor inertia of", [self.joints[j] for j in told], self.rotors[told])
+        for kind in ("coulomb", "viscous", "load", "log constant", "offset"):
+            unknowns.add(f"{kind} of", self.joints, 0.0)
+        unknowns.add("age of torques", [""], 0.0)
+        self.mean, self.n, self.speed = np.array(unknowns.mean), n, SPEED
+        self.without_load = np.zeros(0, np.int64)
+        self.constant_std = np.full(n, CONSTANT_STD)
+
+    def part(self, kind: str) -> slice:
+        """Return where the unknowns of a kind are."""
+        at = self.unknowns.at
+        return at[kind] if kind in at else at[f"{kind} of"]
+
+    def form(self, log: MotionLog, band: float) -> FormedLog:
+        """Return the equations of a log.
+
+        Raises:
+            IdentificationError: it is too short.
+        """
+        motions = halves(log, band)
+        count = len(motions[0].position)
+        period = (len(log.position) - 1) / max(1, count - 1) * log.period
+        low = LowPass.of(count, period, band)
+        if len(low.centres) < FEWEST:
+            raise IdentificationError(
+                f"{log.name} has {log.duration:.3g} s, and {(FEWEST + 9.0) / (3.0 * band):.2g} s are needed in "
+                f"a band of {band:.2g} Hz"
+            )
+        measured = torque_at(log, band)
+        torque = np.zeros((count, self.first + self.n))
+        torque[:, self.first :] = measured
+        rows = tuple(self.links.rows(motion) for motion in motions)
+        for motion, each in zip(motions, rows, strict=True):
+            self.links.free_of_contacts(motion, [each])
+        return FormedLog(
+            log,
+            low,
+            motions,
+            (rows[0], rows[1]),
+            (low(rows[0]), low(rows[1])),
+            low(torque),
+            measured,
+        )
+
+    def prior_std(self, logs: list[FormedLog]) -> Array:
+        """Return the standard deviations beforehand, by the sizes of links, torques and speeds."""
+        tensors = self.links.described.reshape(-1, 10)
+        mass = np.maximum(tensors[:, 0], 1e-6)
+        size = np.sqrt(np.maximum(tensors[:, [4, 6, 9]].sum(axis=1) / mass, 1e-6))
+        powers = np.array([0, *(1,) * 3, *(2,) * 6])
+        links = LINK_STD * (mass[:, None] * size[:, None] ** powers).reshape(-1)
+        self.base_prior = (self.links.lumped * links**2) @ self.links.lumped.T
+        torque = np.concatenate([each.torque[:, self.first :] for each in logs])
+        speed = np.concatenate([each.motions[0].velocity for each in logs])
+        typical = np.maximum(np.sqrt((torque**2).mean(axis=0)), 1e-6)
+        moving = np.maximum(np.sqrt((speed**2).mean(axis=0)), 1e-3)
+        std = np.zeros(len(self.mean))
+        std[self.part("base")] = np.sqrt(np.diag(self.base_prior))
+        told = self.links.told_rotors
+        inertia = np.array([np.abs(np.concatenate([e.rows[0][:, self.first + j] for e in logs])
+                                   @ self.links.described_base).mean() for j in range(self.n)])  # fmt: skip
+        accelerations = np.concatenate([each.motions[0].acceleration for each in logs])
+        inertia /= np.maximum(np.abs(accelerations).mean(axis=0), 1e-6)
+        std[self.part("rotor inertia")] = np.maximum(self.rotors, 0.1 * inertia)[told]
+        std[self.part("coulomb")] = typical
+        std[self.part("viscous")] = typical / moving
+        std[self.part("load")] = LOAD_STD
+        std[self.part("load").start + self.without_load] = NO_LOAD_STD
+        std[self.part("log constant")] = self.constant_std
+        std[self.part("offset")] = 0.1 * typical
+        std[self.part("age of torques")] = AGE_STD
+        return std
+
+    def predicted(self, value: Array, formed: FormedLog, half: int) -> tuple[Array, Array]:
+        """Return the low-passed torques (m, n_velocities) by the unknowns, and their derivatives by each of these."""
+        motion, rows, low = formed.motions[half], formed.rows[half], formed.low
+        first, part = self.first, self.part
+        speed, acceleration = motion.velocity, motion.acceleration
+        sign = np.tanh(speed / self.speed)
+        drive = rows @ value[part("base")]
+        rotors = self.rotors.copy()
+        rotors[self.links.told_rotors] = value[part("rotor inertia")]
+        turning = self._projected(motion, rotors * acceleration)
+        drive = drive + turning
+        loaded = (
+            drive[:, first:] if not first else formed.measured * np.exp(value[part("log constant")])
+        )
+        load = sign * np.abs(loaded)
+        friction = value[part("coulomb")] * sign + value[part("viscous")] * speed
+        friction = friction + value[part("load")] * load
+        whole = drive + self._projected(motion, friction)
+        scale = np.ones(whole.shape[1])
+        scale[first:] = np.exp(-value[part("log constant")])
+        age = float(value[part("age of torques")][0])
+        passed, late = low(whole), low(whole, derivative=True)
+        out = scale * (passed - age * late)
+        jacobian = np.zeros((*out.shape, len(value)))
+        jacobian[:, :, part("base")] = formed.passed[half]
+        if not first:
+            more = value[part("load")] * sign * np.sign(loaded)
+            jacobian[:, :, part("base")] += low(more[:, :, None] * rows)
+        told = self.links.told_rotors
+        for kind, columns, own in (
+            ("rotor inertia", acceleration, told), ("coulomb", sign, range(self.n)),
+            ("viscous", speed, range(self.n)), ("load", load, range(self.n)),
+        ):  # fmt: skip
+            for k, j in enumerate(own):
+                single = np.zeros_like(speed)
+                single[:, j] = columns[:, j]
+                jacobian[:, :, part(kind).start + k] = low(self._projected(motion, single))
+        jacobian *= scale[:, None]
+        for j in range(self.n):
+            jacobian[:, first + j, part("log constant").start + j] = -out[:, first + j]
+            jacobian[:, first + j, part("offset").start + j] = 1.0
+        jacobian[:, :, part("age of torques").start] = -scale * late
+        out[:, first:] += value[part("offset")]
+        return out, jacobian
+
+    def _projected(self, motion: Motion, joints: Array) -> Array:
+        """Return torques of joints (n, n_joints) as rows of all velocities, free of the contacts' forces."""
+        rows = np.zeros((len(joints), self.first + self.n))
+        rows[:, self.first :] = joints
+        self.links.free_of_contacts(motion, [rows])
+        return rows
+
+
+def fit_dynamics(
+    robot: RobotDescription, logs: list[MotionLog], band: float | None = None,
+    trusted: tuple[str, ...] = (),
+) -> tuple[DynamicsModel, FittedDynamics]:  # fmt: skip
+    """Fit a robot's dynamics to logs.
+
+    Args:
+        robot: whose structure and values beforehand are taken.
+        logs: all with torques.
+        band: in which is fitted [Hz]; by default by the torques' spectra.
+        trusted: joints whose torques are right, not only in proportion.
+
+    Raises:
+        IdentificationError: the logs do not tell it: too short, without torques, a base whose motion is unknown; or there is no such
+            joint.
+    """
+    for log in logs:
+        missing(log, robot)
+    model = DynamicsModel(robot)
+    for name in trusted:
+        if name not in model.joints:
+            raise IdentificationError(
+                f"{robot.name} has no joint {name} to trust; it has {', '.join(model.joints)}"
+            )
+        model.constant_std[model.joints.index(name)] = TRUSTED_STD
+    chosen = band_of(logs) if band is None else band
+    found, moved = _with_variants(model, logs, chosen)
+    load = model.part("load")
+    std = np.sqrt(np.diag(found.covariance + moved))
+    weak = np.flatnonzero(np.abs(found.value[load]) < TOLD * std[load])
+    covariance = found.covariance + moved
+    if len(weak):
+        # Left free, what a log does not tell of it is traded against Coulomb friction, and fails where torques are larger.
+        model.without_load = weak
+        again, moved = _with_variants(model, logs, chosen)
+        covariance = again.covariance + moved
+        at = load.start + weak
+        covariance[at, at] = std[at] ** 2
+        found = again
+    return model, FittedDynamics(
+        found.unknowns, found.value, covariance, found.prior_std, found.noise, chosen, found.equations
+    )  # fmt: skip
+
+
+def _with_variants(
+    model: DynamicsModel, logs: list[MotionLog], band: float
+) -> tuple[FittedDynamics, Array]:
+    """Return a fit, and the covariance that its variants add."""
+    found = _fitted(model, logs, band)
+    added = np.zeros_like(found.covariance)
+    for narrower, sharper in VARIANTS:
+        model.speed = sharper * SPEED
+        moved = _fitted(model, logs, narrower * band).value - found.value
+        added += np.outer(moved, moved)
+    model.speed = SPEED
+    return found, added
+
+
+def _fitted(model: DynamicsModel, logs: list[MotionLog], band: float) -> FittedDynamics:
+    formed = [model.form(log, band) for log in logs]
+    value = model.mean.copy()
+    std = model.prior_std(formed)
+    prior = np.diag(std**2)
+    prior[model.part("base"), model.part("base")] = model.base_prior
+    known = np.linalg.inv(prior + 1e-12 * np.diag(std**2))
+    noise = np.concatenate([each.torque for each in formed]).std(axis=0) + 1e-9
+    if model.first:
+        noise[: model.first] = noise[model.first :].mean()
+    thinned = 0.5  # instants are a little closer than the band's errors are independent
+    count = len(value)
+    normal, middle = known, np.zeros((count, count))
+    for _ in range(ROUNDS):
+        normal, side = known.copy(), known @ (model.mean - value)
+        middle, errors = np.zeros((count, count)), []
+        for each in formed:
+            made = [model.predicted(value, each, half) for half in (0, 1)]
+            error = each.torque - 0.5 * (made[0][0] + made[1][0])
+            errors.append(error)
+            weight = np.minimum(1.0, OUTLYING * noise / np.maximum(np.abs(error), 1e-12)) / noise**2
+            scores = np.zeros((len(error), count))
+            for half in (0, 1):
+                instruments = made[1 - half][1] * weight[:, :, None] * (0.5 * thinned)
+                normal += np.einsum("mrk,mrl->kl", instruments, made[half][1])
+                scores += np.einsum("mrk,mr->mk", instruments, each.torque - made[half][0])
+            side += scores.sum(axis=0)
+            period = (each.low.centres[1] - each.low.centres[0]) * _period(each)
+            size = max(1, round(CLUSTER / (band * period)))
+            for start in range(0, len(scores), size):
+                one = scores[start : start + size].sum(axis=0)
+                middle += np.outer(one, one)
+        value = value + np.linalg.solve(normal, side)
+        noise = np.concatenate(errors).std(axis=0) + 1e-9
+    inverse = np.linalg.inv(normal)
+    covariance = inverse @ (middle + known) @ inverse.T
+    equations = sum(each.torque.size for each in formed)
+    return FittedDynamics(model.unknowns, value, covariance, std, noise, band, equations)
+
+
+def _period(formed: FormedLog) -> float:
+    log = formed.log
+    return (len(log.position) - 1) / max(1, len(formed.motions[0].position) - 1) * log.period

@@ -1,0 +1,162 @@
+"""What identification takes of a log, of whatever robot and by whomever: joints, torques, and the IMU of a free base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....mathematics.arrays import Array
+from ....robots.robot_description import RobotDescription
+from ....runtime.language.errors import AloftError
+from .identification import IdentificationError
+
+if TYPE_CHECKING:
+    from ....logs.file.reader import RecordedRun
+
+
+@dataclass(frozen=True)
+class MotionLog:
+    """The measurements of one run on an even grid, one row a sample. What was not measured is None.
+
+    Attributes:
+        name: of the log, for reports.
+        period: between two samples [s].
+        position: of the joints [rad or m], (n, n_joints).
+        torque: measured at the joints [N m or N], (n, n_joints).
+        asked: commanded torques without joint feedback [N m or N], (n, n_joints).
+        angular_velocity, specific_force: of a floating base, in its axes [rad/s, m/s^2], (n, 3).
+        closed: the foot switches, (n, n_contacts).
+    """
+
+    name: str
+    period: float
+    position: Array
+    torque: Array | None = None
+    asked: Array | None = None
+    angular_velocity: Array | None = None
+    specific_force: Array | None = None
+    closed: NDArray[np.bool_] | None = None
+
+    @property
+    def duration(self) -> float:
+        """From the first sample to the last [s]."""
+        return self.period * (len(self.position) - 1)
+
+
+def log_of_recording(
+    run: RecordedRun, robot: RobotDescription, block: str = "robot", command: str = "safety.command"
+) -> MotionLog:
+    """Pick the signals of a recorded run. Only the joints' positions have to be there.
+
+    Raises:
+        AloftError: there are none under this name, or ticks are missing.
+    """
+    signals = run.signals()
+
+    def signal(name: str) -> Array | None:
+        return run[name] if name in signals else None
+
+    position = signal(f"{block}.joints.position")
+    if position is None:
+        near = [name for name in signals if name.endswith(".position")][:4]
+        raise AloftError(
+            f"{run.path}: no signal '{block}.joints.position', and without the joints' positions nothing is told; "
+            f"--robot names the robot's block{' (there is ' + ', '.join(near) + ')' if near else ''}"
+        )
+    if (np.diff(run.ticks) != 1).any():
+        raise AloftError(
+            f"{run.path}: the robot must run, and be recorded, in every tick of the graph"
+        )
+    asked = signal(f"{command}.torque")
+    for gain in ("stiffness", "damping"):
+        values = signal(f"{command}.{gain}")
+        if values is not None and (values != 0.0).any():
+            asked = None  # the drives add torques of their own
+    torque = signal(f"{block}.joints.torque")
+    closed = signal(f"{block}.contacts.closed")
+    floating = robot.base_joint == "floating"
+    return MotionLog(
+        run.path.name, 1.0 / run.header.base_rate, position,
+        None if torque is None or not torque.any() else torque, asked,
+        signal(f"{block}.imu.angular_velocity") if floating else None,
+        signal(f"{block}.imu.specific_force") if floating else None,
+        None if closed is None or not floating else closed.astype(np.bool_),
+    )  # fmt: skip
+
+
+def log_of_graph(file: Path, block: str | None = None) -> tuple[MotionLog, RobotDescription]:
+    """Read the log of a graph's ``hal.LogRobot`` at the graph's rate, without a run.
+
+    Args:
+        file: the graph.
+        block: the path of its LogRobot; by default its only one.
+
+    Raises:
+        AloftError: the graph has errors or no such block, or the log lacks what the block names.
+    """
+    from .... import load
+    from ....hal.log.log_robot import LogRobot, opened
+    from ....hal.log.parameters import LogParameters
+    from ....hal.log.played_log import play
+
+    checked = load(file).checked
+    found = [
+        spec for spec in checked.blocks
+        if issubclass(spec.block_type, LogRobot) and block in (None, spec.path)
+    ]  # fmt: skip
+    robot = checked.robot
+    if robot is None or len(found) != 1:
+        raise AloftError(
+            f"{file}: {len(found)} blocks hal.LogRobot{f' called {block}' if block else ''}, and identification reads one; "
+            "--robot names it"
+        )
+    params, period = found[0].params, checked.base_period * found[0].period_ticks
+    assert isinstance(params, LogParameters)
+    played = play(opened(found[0].folder / params.file), params, robot, period)
+    rows = played.rows
+    if params.joints is None or rows is None:
+        raise AloftError(f"{file}: {params.file} names no joints, and nothing is told without")
+    floating = robot.base_joint == "floating"
+    imu = params.imu is not None and floating
+    return MotionLog(
+        Path(params.file).name, period, rows.position,
+        None if params.joints.torque is None else rows.torque, played.commanded,
+        rows.imu[:, :3] if imu else None, rows.imu[:, 3:] if imu else None,
+        rows.closed if params.contacts and floating else None,
+    ), robot  # fmt: skip
+
+
+def missing(log: MotionLog, robot: RobotDescription) -> list[str]:
+    """Say what a log cannot tell, and why; empty where it has all that the fit uses.
+
+    Raises:
+        IdentificationError: it tells nothing: the text says what would.
+    """
+    untold = []
+    if log.torque is None:
+        raise IdentificationError(
+            f"{log.name} has no torques, so masses, inertias, gravity terms, friction, rotor inertia, torque constants and "
+            "delay cannot be told: motion alone determines none of them. Log the measured torques, or the motors' "
+            "currents times their torque constants (joints.torque)"
+        )
+    if robot.base_joint == "floating":
+        if log.specific_force is None or log.angular_velocity is None:
+            raise IdentificationError(
+                f"{log.name} has no IMU, so the motion of {robot.name}'s floating base is unknown and no inertia can be "
+                "told: give the log's imu, or fix the base"
+            )
+        if log.closed is None:
+            raise IdentificationError(
+                f"{log.name} has no contacts, so forces of the ground cannot be told from inertia: give contacts"
+            )
+    elif robot.base_joint != "fixed":
+        raise IdentificationError(
+            f"{robot.name} has a {robot.base_joint} base: none of that is fitted"
+        )
+    if log.asked is None:
+        untold.append("delay: the log has no commanded torques without joint feedback")
+    return untold

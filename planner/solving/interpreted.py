@@ -1,0 +1,284 @@
+"""Functions of CasADi for many instants at once.
+
+CasADi's own virtual machine takes the instants one after the other, and ten times as long. Nothing is compiled for a
+function: see ``mathematics.compiling.lanes``. The values are CasADi's own to the bit.
+"""
+
+from __future__ import annotations
+
+import threading
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mathematics.arrays import Array, Indices
+from ...mathematics.compiling.lanes import OPERATIONS, Lanes, Program
+
+_SAME = (
+    "add", "sub", "mul", "div", "neg", "sqrt", "fabs", "copysign", "sign", "not", "and", "or",
+    "twice", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log",
+    "floor", "ceil", "atan2", "pow", "fmin", "fmax",
+)  # fmt: skip
+_OTHER = {
+    "ASSIGN": "copy", "SQ": "square", "INV": "inverse", "LT": "less", "LE": "less_equal", "EQ": "equal",
+    "NE": "not_equal", "IF_ELSE_ZERO": "if", "CONSTPOW": "pow",
+}  # fmt: skip
+"""CasADi's names of operations, of which ``_SAME`` are the same, and those of ``OPERATIONS``."""
+
+
+@cache
+def _places() -> dict[int, int]:
+    """Return the places in ``OPERATIONS`` of CasADi's numbers of operations."""
+    import casadi as ca
+
+    names = {name.upper(): name for name in _SAME} | _OTHER
+    return {getattr(ca, f"OP_{name}"): OPERATIONS.index(own) for name, own in names.items()}
+
+
+def read_program(function: Any) -> Program:
+    """Return the instructions of a function that is made of ``SX`` expressions, without those that compute again what
+    is known: CasADi's own search for these takes four times as long.
+
+    Raises:
+        ValueError: one of them is none of ``OPERATIONS``.
+    """
+    import casadi as ca
+
+    places = _places()
+    constant, read, write = (OPERATIONS.index(each) for each in ("constant", "input", "output"))
+    values = [0] * function.sz_w()
+    """By CasADi's slot the number of the value that is in it now."""
+    known: dict[tuple[Any, ...], int] = {}
+    steps: list[tuple[int, ...]] = []
+    last: list[int] = []
+    """By value the last step that needs it."""
+    constants: list[float] = []
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        goal = function.instruction_output(k)
+        step: tuple[int, ...]
+        if operation in places:
+            operands = function.instruction_input(k)
+            first, second = values[operands[0]], values[operands[-1]]
+            key: tuple[Any, ...] = (operation, first, second)
+            step = (places[operation], first, second)
+        elif operation == ca.OP_CONST:
+            number = function.instruction_constant(k)
+            key = (number.hex(),)  # which tells zeros apart
+            step = (constant, len(constants), 0)
+        elif operation == ca.OP_INPUT:
+            step = (read, *function.instruction_input(k))
+            key = ("input", *step)
+        elif operation == ca.OP_OUTPUT:
+            value = values[function.instruction_input(k)[0]]
+            last[value] = len(steps)
+            steps.append((write, goal[0], value, goal[1]))
+            continue
+        else:
+            raise ValueError(
+                f"{function.name()}: instruction {k} is CasADi's operation {operation}, which is not interpreted"
+            )
+        value = known.setdefault(key, len(last))
+        if value == len(last):
+            last.append(len(steps))
+            if operation in places:
+                last[first] = last[second] = len(steps)
+            steps.append((step[0], value, *step[1:]))
+            if operation == ca.OP_CONST:
+                constants.append(number)
+        values[goal[0]] = value
+    return _placed(steps, last, np.array(constants))
+
+
+def _placed(steps: list[tuple[int, ...]], last: list[int], constants: Array) -> Program:
+    """Give every value a slot, which is free again after the last step that needs it."""
+    end, constant, read, write = (
+        OPERATIONS.index(name) for name in ("end", "constant", "input", "output")
+    )
+    slot_of, free, slots = [0] * len(last), [], 0
+    rows: list[tuple[int, ...]] = []
+    for k, (operation, goal, first, second) in enumerate(steps):
+        if operation == write:
+            rows.append((write, goal, slot_of[first], second))
+            if last[first] == k:
+                free.append(slot_of[first])
+            continue
+        row = (first, second)
+        if operation not in (constant, read):
+            row = (slot_of[first], slot_of[second])
+            free += [slot_of[each] for each in {first, second} if last[each] == k]
+        if not free:
+            free.append(slots)
+            slots += 1
+        slot_of[goal] = free.pop()
+        rows.append((operation, slot_of[goal], *row))
+        if last[goal] == k:
+            free.append(slot_of[goal])
+    rows.append((end, 0, 0, 0))
+    return Program(np.array(rows, np.int32), constants, slots)
+
+
+class Pattern(NamedTuple):
+    """Where a matrix has entries: its shape, and as CasADi has them the columns' starts and the entries' rows."""
+
+    shape: tuple[int, int]
+    starts: list[int]
+    rows: list[int]
+
+
+class InterpretedFunction:
+    """A function of CasADi as its instructions, with those methods of CasADi's own that the planner uses.
+
+    It can be pickled.
+
+    Args:
+        name: of the function.
+        instructions, constants: of the program, see ``lanes.Program``.
+        layout: whole numbers; how many slots, arguments and results there are, then of each argument and result
+            height, width, entries, the columns' starts and the entries' rows.
+
+    Attributes:
+        program: the instructions.
+        inputs, outputs: where arguments and results have entries.
+    """
+
+    def __init__(
+        self, name: str, instructions: NDArray[np.int32], constants: Array, layout: Indices
+    ) -> None:
+        self._name, self._layout = name, layout
+        slots, given, found, *numbers = layout.tolist()
+        self.program = Program(instructions, constants, slots)
+        patterns, place = [], 0
+        for _ in range(given + found):
+            height, width, entries = numbers[place : place + 3]
+            first = place + 3
+            middle = first + width + 1
+            place = middle + entries
+            patterns.append(Pattern((height, width), numbers[first:middle], numbers[middle:place]))
+        self.inputs, self.outputs = patterns[:given], patterns[given:]
+        self._maps: dict[int, Any] = {}
+
+    def arrays(self) -> tuple[NDArray[np.int32], Array, Indices]:
+        """Return the arguments but the name."""
+        return self.program.instructions, self.program.constants, self._layout
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Leave CasADi's objects out."""
+        return type(self), (self._name, *self.arrays())
+
+    def name(self) -> str:
+        """Return the name."""
+        return self._name
+
+    def n_in(self) -> int:
+        """Return the number of arguments."""
+        return len(self.inputs)
+
+    def size1_in(self, number: int) -> int:
+        """Return the height of an argument."""
+        return self.inputs[number].shape[0]
+
+    def size1_out(self, number: int) -> int:
+        """Return the height of a result."""
+        return self.outputs[number].shape[0]
+
+    def sparsity_in(self, number: int) -> Any:
+        """Return the pattern of an argument."""
+        return _sparsity(self.inputs[number])
+
+    def sparsity_out(self, number: int) -> Any:
+        """Return the pattern of a result."""
+        return _sparsity(self.outputs[number])
+
+    def map(self, count: int) -> Any:
+        """Return the function of CasADi for ``count`` instants, whose arguments and results are side by side."""
+        if count not in self._maps:  # kept here, because CasADi keeps no object of Python
+            self._maps[count] = _callback()(self, count)
+        return self._maps[count]
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Return the values at one instant, as CasADi's matrices."""
+        return self.map(1)(*arguments)
+
+
+def interpreted(function: Any) -> InterpretedFunction:
+    """Return a function of CasADi's ``SX`` expressions as its instructions.
+
+    Raises:
+        ValueError: see ``read_program``.
+    """
+    program = read_program(function)
+    layout = [program.slots, function.n_in(), function.n_out()]
+    for sparsity in (
+        *(function.sparsity_in(k) for k in range(function.n_in())),
+        *(function.sparsity_out(k) for k in range(function.n_out())),
+    ):
+        layout += [*sparsity.shape, sparsity.nnz(), *sparsity.colind(), *sparsity.row()]
+    return InterpretedFunction(
+        function.name(), program.instructions, program.constants, np.array(layout, np.int64)
+    )
+
+
+def _sparsity(pattern: Pattern) -> Any:
+    import casadi as ca
+
+    return ca.Sparsity(*pattern.shape, pattern.starts, pattern.rows)
+
+
+@cache
+def _callback() -> Any:
+    """Return the class of functions that CasADi calls, which needs CasADi to be defined."""
+    import casadi as ca
+
+    class Mapped(ca.Callback):
+        """An interpreted function at a number of instants."""
+
+        def __init__(self, function: InterpretedFunction, count: int) -> None:
+            ca.Callback.__init__(self)
+            self._given = [ca.repmat(_sparsity(each), 1, count) for each in function.inputs]
+            self._found = [ca.repmat(_sparsity(each), 1, count) for each in function.outputs]
+            lanes = Lanes(
+                function.program, count,
+                [len(each.rows) for each in function.inputs],
+                [len(each.rows) for each in function.outputs],
+            )  # fmt: skip
+            self._lanes, self._lock = lanes, threading.Lock()
+            self._arguments, self._results = (
+                [_bytes(array) for array in arrays] for arrays in (lanes.inputs, lanes.outputs)
+            )
+            self.construct(f"{function.name()}_{count}", {})
+
+        def get_n_in(self) -> int:
+            return len(self._given)
+
+        def get_n_out(self) -> int:
+            return len(self._found)
+
+        def get_sparsity_in(self, number: int) -> Any:
+            return self._given[number]
+
+        def get_sparsity_out(self, number: int) -> Any:
+            return self._found[number]
+
+        def has_eval_buffer(self) -> bool:
+            return True
+
+        def eval_buffer(self, arguments: Any, results: Any) -> int:
+            """Copy CasADi's arguments in, of which zeros may be missing, and the results out that it asks for."""
+            with self._lock:  # CasADi gives the interpreter's lock back, so another thread may call
+                for own, given in zip(self._arguments, arguments, strict=True):
+                    own[:] = bytes(len(own)) if given is None else given
+                self._lanes.run()
+                for own, wanted in zip(self._results, results, strict=True):
+                    if wanted is not None:
+                        wanted[:] = own
+            return 0
+
+    return Mapped
+
+
+def _bytes(array: Any) -> memoryview:
+    """Return an array's memory."""
+    return memoryview(array.reshape(-1)).cast("B")

@@ -1,0 +1,76 @@
+"""What `aloft log import` guesses from names and widths, and the graph that it writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from aloft.cli.log_import import graph_of, guess, numbered
+from aloft.runtime.loading import LoadError, checked_file
+
+PENDULUM = [
+    "time", "pos_meas1", "pos_meas2", "pos_filt1", "pos_filt2", "pos_des1", "pos_des2",
+    "tau_des1", "tau_des2", "tau_fric1", "tau_fric2", "tau_meas1", "tau_meas2",
+]  # fmt: skip
+
+
+def test_numbered_columns_are_one_quantity_and_the_measured_one_is_taken() -> None:
+    guessed = guess(dict.fromkeys(PENDULUM, 1), joints=2)
+    assert guessed == {
+        "time": "time",
+        "joint_position": ["pos_meas1", "pos_meas2"],
+        "joint_torque": ["tau_meas1", "tau_meas2"],
+    }
+    assert "joint_position" not in guess(dict.fromkeys(PENDULUM, 1), joints=3), "two are no three"
+    graph = graph_of(Path("log.csv"), None, guessed, own_stamps=False)
+    assert list(graph["blocks"]) == ["robot"], "without an IMU no base is estimated"
+    joints = graph["blocks"]["robot"]["with"]["joints"]
+    assert joints == {"position": ["pos_meas1", "pos_meas2"], "torque": ["tau_meas1", "tau_meas2"]}
+
+
+def test_measured_columns_come_before_wanted_ones_whatever_their_order() -> None:
+    widths = {
+        "q_des": 12,
+        "effort_cmd": 12,
+        "joint_position_target": 12,
+        "joint_position": 12,
+        "effort": 12,
+    }
+    guessed = guess(widths)
+    assert (guessed["joint_position"], guessed["joint_torque"]) == ("joint_position", "effort")
+
+
+@pytest.mark.parametrize(
+    ("names", "series"),
+    [
+        (["q[0]", "q[1]", "q[2]"], {"q": ["q[0]", "q[1]", "q[2]"]}),
+        (["q_2", "q_1", "q_10", "q_3"], {}),  # one is missing
+        (["acc2", "acc3"], {}),  # they begin neither with 0 nor with 1
+        (["q1 [deg]", "q2 [deg]"], {"q [deg]": ["q1 [deg]", "q2 [deg]"]}),
+        (["q", "q0", "q1"], {}),  # the name is taken
+    ],
+)
+def test_columns_that_count_up(names: list[str], series: dict[str, list[str]]) -> None:
+    assert numbered(dict.fromkeys(names, 1)) == series
+
+
+STICK = """<mujoco><worldbody><body name="rod"><joint name="hinge" axis="0 1 0" range="-1 1"/>
+<geom type="capsule" fromto="0 0 0 0 0 -.5" size=".02" mass="1"/></body></worldbody>
+<actuator><motor joint="hinge" ctrlrange="-5 5"/></actuator></mujoco>"""
+
+
+def test_a_selection_of_a_signal_without_elements_is_named(tmp_path: Path) -> None:
+    (tmp_path / "stick.xml").write_text(STICK)
+    file = tmp_path / "graph.yaml"
+    file.write_text("""\
+rate: 100 Hz
+robot: stick.xml
+blocks:
+  robot: {use: hal.MujocoRobot}
+  any: {use: blocks.Not, in: {u: "robot.contacts.closed[0]"}}
+""")
+    with pytest.raises(LoadError) as caught:
+        checked_file(file)
+    messages = [problem.message for problem in caught.value.report.problems]
+    assert "robot.contacts.closed[0] has no elements with this robot" in messages
