@@ -59,11 +59,10 @@ STATUS_TEXTS = {
     Status.OUT_OF_RANGE: "a block got a number beyond the largest float, see last_block",
     Status.WRONG_LENGTH: "a block met a slice of another length than what it is combined with, see last_block",
 }
-_STATUS_OF = {
+_STATUS_OF = {  # of a kernel that fails
     Failure.DIVISION: Status.DIVIDED_BY_ZERO, Failure.TOO_LARGE: Status.TOO_LARGE, Failure.DOMAIN: Status.OUT_OF_DOMAIN,
     Failure.RANGE: Status.OUT_OF_RANGE, Failure.SLICE: Status.WRONG_LENGTH,
 }  # fmt: skip
-"""What a library says of a kernel that fails; one with functions of Numba is not exported."""
 MARK, CODE, BLOCK = 0, 8, 12
 """The bytes of an instance that hold the mark of the library, the last code and its block."""
 
@@ -86,8 +85,7 @@ class Module:
         name: of the library; its functions begin with it.
         part: what it computes.
         mark: a number that no other library has.
-        functions: functions beside the step, by name, which make these calls; ``Status`` is their
-            result. All that they work on is in the instance.
+        functions: functions beside the step, by name, which make these calls, all in the instance; they return a ``Status``.
         visible: further memory that is to be in the instance.
     """
 
