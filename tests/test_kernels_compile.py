@@ -51,6 +51,7 @@ PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool", *vars(arrays)} - {
 NOT_HOT = {
     "blocks.estimation.gross_errors.gravity_looks_like": "for the text of a fault, once",
     "blocks.estimation.gross_errors.looks_like": "for the text of a fault, once",
+    "blocks.estimation.gross_errors.push_looks_like": "for the text of a fault, once",
     "blocks.estimation.gross_errors.vector_text": "for the text of a fault, once",
     "blocks.general.table_playback._sides": "before a run, when the table is read",
     "hal.log.columns.at_times": "before a run, when the log is read",
