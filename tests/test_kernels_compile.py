@@ -61,6 +61,7 @@ NOT_HOT = {
     "hal.log.played_log.quaternion_of_rpy": "before a run, when the log is read",
     "hal.log.played_log.rotation_of": "before a run, when the log is read",
     "hal.log.played_log.rotation_of_rpy": "before a run, when the log is read",
+    "mathematics.compiling.lanes._all_lanes": "of a constant, in the code that is made",
     "mathematics.compiling.numpy_numbers.demand": "its name stands for a test that the compiler writes",
     "mathematics.quadratic_program._sparse": "for solvers of other packages, in plain Python",
     "mathematics.ticks.all_in_ticks": "of a table, in setup",
