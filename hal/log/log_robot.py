@@ -39,7 +39,8 @@ class LogRobot(Robot):
     ``{columns: ..., unit: deg, scale: [-1.0], offset: [0.0]}``. Units in a CSV's header, ``q1 [deg]``, are taken.
 
     Joints are found by name; those that the log lacks stand at the description's ``held`` or standing angle. The
-    IMU's samples are turned to the base's axes and moved to its origin: f - w x (w x r) - w' x r. A force becomes a
+    IMU's samples are turned to the base's axes and moved to its origin: f - w x (w x r) - w' x r, and from another link over the
+    joints between. A force becomes a
     contact with two thresholds. Between rows it is linear, holds the last row, or is the mean over the tick before;
     contacts always hold.
 
@@ -53,8 +54,7 @@ class LogRobot(Robot):
     ``truth`` has the base's pose by motion capture, its velocities by differences, and the contacts; other fields are
     zero. Its world is that of the cameras: ``EstimatorScore`` compares with ``align: start``.
 
-    Mistakes in the parameters are reported all at once when the graph is checked. It does not move the IMU of another link
-    to the base.
+    Mistakes in the parameters are reported all at once when the graph is checked.
     """
 
     Params = LogParameters
