@@ -222,7 +222,8 @@ class _Composer:
         return node
 
     def _where(self, event: Any) -> Position:
-        return Position(self.shown, event.start_mark.line + 1, event.start_mark.column + 1)
+        mark = event.start_mark
+        return Position(self.shown, mark.line + 1, mark.column + 1)
 
     def _reject(self, code: Code, message: str, where: Position) -> _Rejected:
         self.problems.add(code, message, where)
@@ -268,7 +269,9 @@ class _Composer:
         return made
 
     def _scalar(self, event: Any, where: Position) -> Plain:
-        text: str = event.value.translate(_SHOWN)
+        text: str = event.value
+        if not text.isascii():
+            text = text.translate(_SHOWN)
         if event.tag is None or event.tag == "!":
             if not event.implicit[0] or (text and text[0] not in _FIRST):
                 return text
@@ -320,17 +323,25 @@ class _Composer:
         size = 1
         while not isinstance(key_event := self.loader.get_event(), yaml.MappingEndEvent):
             key_where = self._where(key_event)
-            key_node, _ = self._node(key_event)
+            written = isinstance(key_event, yaml.ScalarEvent)
+            # Most keys are nothing but texts, and need no node.
+            if (
+                not written or key_event.anchor is not None or key_event.tag is not None
+                or key_event.value[:1] in _FIRST
+            ):  # fmt: skip
+                key_node, _ = self._node(key_event)
+                if not isinstance(key_node, ScalarNode):
+                    size += self._node(self.loader.get_event())[1]
+                    self.problems.add(
+                        Code.WRONG_KIND, "a key must be text, not a collection", key_where
+                    )
+                    continue
             value, value_size = self._node(self.loader.get_event())
             size += value_size
-            if not isinstance(key_node, ScalarNode):
-                self.problems.add(
-                    Code.WRONG_KIND, "a key must be text, not a collection", key_where
-                )
-                continue
             # A key is always the text as it is written, also if that is `on`, `null` or `1`.
-            written = isinstance(key_event, yaml.ScalarEvent)
-            key = str(key_event.value if written else key_node.value).translate(_SHOWN)
+            key = str(key_event.value if written else key_node.value)
+            if not key.isascii():
+                key = key.translate(_SHOWN)
             if key == "<<" and written and key_event.implicit[0]:
                 self._merge(value, key_where, merged)
             elif key in entries:

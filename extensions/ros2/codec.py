@@ -179,7 +179,8 @@ class MessageType:
         )
         """The texts that name frames, each with the frame of the numbers beside it and the place of a
         list in its path, or -1."""
-        unknown = [path for path in sizes if path not in self.lists]
+        left_out = [path for path in self._empty if sizes.get(path) == 0]
+        unknown = [path for path in sizes if path not in (*self.lists, *left_out)]
         if unknown:
             known = ", ".join([*self.lists, *self._empty]) or "none"
             raise BlockError(f"{self.name} has no list {unknown[0]!r}; its lists are {known}")

@@ -38,6 +38,7 @@ from .recorder import recorder
 from .robot_files import robot_files
 from .rows import Row
 from .scheduler import scheduler
+from .speed import speed
 from .startup import startup
 from .stones import go2_staircase, staircase, stones
 from .tick.solvers import solvers
@@ -46,6 +47,7 @@ from .tick.tick import tick
 BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "tick": tick,
     "solvers": solvers,
+    "speed": speed,
     "startup": startup,
     "loading": loading,
     "scheduler": scheduler,
@@ -78,7 +80,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
 }
 """All benchmarks by name; each returns its rows."""
 LONG = (
-    "agreement", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
+    "agreement", "speed", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
     "pushed_courses", "changed_targets", "hopping_on", "stones", "staircase", "go2_staircase", "every_robot",
     "mutated_robots", "robot_files",
 )  # fmt: skip
@@ -105,7 +107,8 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
     "jitter": ("link_delays",),
     "loss": ("link_delays",),
     "tsid": ("tick", "export"),
-    "since": ("tick",),
+    "since": ("tick", "speed"),
+    "everything": ("speed",),
     "arms": ("real_robot",),
     "robot": ("courses", "real_robot"),
     "asked": ("real_robot", "known_effects"),

@@ -61,8 +61,14 @@ def bench(
         str, typer.Option(help="The folder with the wheels of TSID, a peer of 'tick' and 'export'.")
     ] = "",
     since: Annotated[
-        str, typer.Option(help="A commit whose controller 'tick' measures as well: '65ca00c'.")
+        str,
+        typer.Option(
+            help="An earlier build, a commit or a folder: 'speed' gives ratios to it, 'tick' measures its controller."
+        ),
     ] = "",
+    everything: Annotated[
+        bool, typer.Option("--all", help="Also rows of 'speed' above 5 s, three times each.")
+    ] = False,
     arms: Annotated[
         str,
         typer.Option(help="Arms of 'real_robot', separated by semicolons: 'calibrated'."),
@@ -111,6 +117,7 @@ def bench(
             "loss": _number("--loss", loss, "1", 0.999, "'5 %', less than all"),
             "tsid": tsid or None,
             "since": since or None,
+            "everything": everything or None,
             "arms": _names(arms),
             "asked": _names(asked),
             "robot": robot or None,

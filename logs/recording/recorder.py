@@ -42,9 +42,6 @@ that is slow, as its disk is slow or the machine has too much to do, makes progr
 GIVE_UP_TIME = 600.0
 """Seconds without any progress after which a simulation gives the process up, too."""
 
-
-RING_BYTES = 1 << 26
-"""Bytes of the ring, at most."""
 WhenFull = Literal["wait", "drop"]
 
 
@@ -63,7 +60,8 @@ class Recorder(Sink):
             process that is killed loses no more than that.
         sync_period: seconds after which it is put on the disk; a power cut takes no more than that.
         ring_time: seconds of the run that fit into the ring, if they fit into its bytes.
-        ring_bytes: bytes of the ring, at most, but that it always holds four keyframes.
+        ring_bytes: bytes of the ring, at most, but that it always holds four keyframes; by default what the graph
+            says in ``recording``.
         split: seconds of the graph's time after which the recording goes on in a new file, at the
             next keyframe: ``jump.rrd``, ``jump-part002.rrd`` ... Each can be read and replayed by
             itself. Zero for one file.
@@ -97,7 +95,7 @@ class Recorder(Sink):
         flush_period: float = 0.5,
         sync_period: float = 5.0,
         ring_time: float = 4.0,
-        ring_bytes: int = RING_BYTES,
+        ring_bytes: int | None = None,
         split: float = 0.0,
         live: str = "",
         link: RecorderLink | None = None,
@@ -189,6 +187,8 @@ class Recorder(Sink):
         self._parts = HeldGroups(split, self._bus) if split.held else None
         row = space_of(split.base.layout.size)
         row += sum(space_of(part.layout.size) // part.period for part in split.held)
+        if ring_bytes is None:
+            ring_bytes = graph.recording.ring_bytes
         capacity = min(round(ring_time * rate) * row, ring_bytes) + frame
         header = about.to_json()
         try:

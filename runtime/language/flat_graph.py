@@ -189,6 +189,7 @@ class FlatGraph:
     actuators: Entry | None = None
     dimensions: MapNode | None = None
     clock: MapNode | None = None
+    recording: MapNode | None = None
     machines: MapNode | None = None
     links: MapNode | None = None
     faults: MapNode | None = None
@@ -224,6 +225,7 @@ class FlatGraph:
         for key, node in (
             ("dimensions", self.dimensions),
             ("clock", self.clock),
+            ("recording", self.recording),
             ("machines", self.machines),
             ("links", self.links),
             ("faults", self.faults),

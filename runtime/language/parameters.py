@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -71,17 +71,20 @@ def group_of(info: FieldInfo) -> type[Parameters] | None:
     return only if isinstance(only, type) and issubclass(only, Parameters) else None
 
 
-def declared_fields(model: type[Parameters], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
-    """Yield the parameters of a model and of its groups, by path: ``sensors.imu.bandwidth``.
+@lru_cache(maxsize=1024)
+def declared_fields(model: type[Parameters], prefix: str = "") -> tuple[tuple[str, FieldInfo], ...]:
+    """Return the parameters of a model and of its groups, by path: ``sensors.imu.bandwidth``.
 
     A group that may be left out stands before what is in it.
     """
+    found: list[tuple[str, FieldInfo]] = []
     for name, info in model.model_fields.items():
         group = group_of(info)
         if group is None or type(None) in get_args(info.annotation):
-            yield f"{prefix}{name}", info
+            found.append((f"{prefix}{name}", info))
         if group is not None:
-            yield from declared_fields(group, f"{prefix}{name}.")
+            found += declared_fields(group, f"{prefix}{name}.")
+    return tuple(found)
 
 
 def given_values(params: Parameters, prefix: str = "") -> Iterator[tuple[str, Any, FieldInfo]]:
@@ -159,7 +162,8 @@ class Parameters(BaseModel):
         return converted
 
 
-def parameter_kinds(params: type[Parameters]) -> dict[str, Kind]:
+@lru_cache(maxsize=1024)
+def parameter_kinds(params: type[Parameters]) -> Mapping[str, Kind]:
     """Return the kind of each parameter for a kernel: numbers, vectors and matrices of numbers, and
     words."""
     scope = vars(sys.modules[params.__module__])

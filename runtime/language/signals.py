@@ -243,7 +243,8 @@ def signal_of(name: str, fields: Mapping[str, Mapping[str, Any]]) -> type[Signal
 
     Args:
         name: its name.
-        fields: of each field ``shape``, ``dtype``, ``unit``, ``frame`` and ``text``, each of which may be missing.
+        fields: of each field ``shape``, ``dtype``, ``unit``, ``frame``, ``text`` and ``quaternion``, each of which
+            may be missing.
 
     Raises:
         DeclarationError: as for ``Field``.
@@ -256,5 +257,6 @@ def signal_of(name: str, fields: Mapping[str, Mapping[str, Any]]) -> type[Signal
             frame=field.get("frame"),
             dtype=field.get("dtype", "float64"),
             text=field.get("text") or f"{key}, from outside",
+            quaternion=field.get("quaternion", False),
         )
     return type(name, (Signal,), body)

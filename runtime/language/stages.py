@@ -146,6 +146,14 @@ class ClockSpec:
 
 
 @dataclass(frozen=True)
+class RecordingSpec:
+    """Settings of the recorder."""
+
+    ring_bytes: int = 1 << 26
+    """Bytes of the ring between run and recorder, at most, but that it always holds four keyframes."""
+
+
+@dataclass(frozen=True)
 class CheckedGraph:
     """A graph that may run: its blocks in file order, and the order in which they execute."""
 
@@ -159,6 +167,7 @@ class CheckedGraph:
     """The duration of a run in ticks; ``None`` if it runs until it is stopped."""
     robot: RobotDescription | None = None
     clock: ClockSpec = ClockSpec()
+    recording: RecordingSpec = RecordingSpec()
     file: str = ""
     """The graph file, as it was given; files that the graph names are relative to its folder."""
     overrides: Mapping[str, Any] = field(default_factory=dict)

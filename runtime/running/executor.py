@@ -16,6 +16,7 @@ from typing import Any
 
 from ...mathematics.compiling.compile_calls import compile_calls
 from ..language.block import Block, Metric
+from ..language.collector import collector_paused
 from ..language.errors import AloftError, ExitCode, RunError
 from ..language.stages import CheckedGraph, ClockSpec
 from .failures import describe, locate
@@ -55,6 +56,7 @@ class Executor:
         AloftError: the graph's clock is the robot's, and there is none to drive it.
     """
 
+    @collector_paused()
     def __init__(
         self,
         graph: CheckedGraph | BoundGraph,
@@ -98,6 +100,7 @@ class Executor:
         self._paused = 0  # [ns]
         self._error: RunError | None = None
 
+    @collector_paused()
     def start(self, ticks: int | None = None) -> None:
         """Compile the kernels, open the sinks and start all blocks: idle -> ready.
 

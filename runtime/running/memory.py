@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ...mathematics.compiling.kernel_call import KernelCall, collect_calls
 from ...robots.description import RobotDescription
 from ..language.block import Block, Clock, Context
+from ..language.collector import collector_paused
 from ..language.errors import DeclarationError, RunError
 from ..language.layout import ALIGNMENT, LARGEST, Layout, PortLayout
 from ..language.signals import DTYPES, Signal
@@ -197,6 +198,7 @@ class BoundGraph:
     machine = ""
     """Machine whose part of a graph this is; empty for a whole graph."""
 
+    @collector_paused()
     def __init__(self, graph: CheckedGraph, clock: Clock | None = None) -> None:
         self.graph = graph
         self.clock = clock or self.clock_type(graph.base_period)

@@ -101,6 +101,27 @@ def test_a_network_that_becomes_too_slow_is_refused_with_what_was_measured(
     assert "too slow" in reasons or "(links.patience)" in reasons
 
 
+def test_a_clock_that_is_a_day_ahead_makes_no_message_old(network: Network, here: Path) -> None:
+    ahead = ["unshare", "--time", "--monotonic", "86400", "--boottime", "86400", "--fork"]
+    try:
+        subprocess.run([*ahead, "true"], check=True, capture_output=True, timeout=20.0)
+    except (OSError, subprocess.CalledProcessError) as error:
+        pytest.skip(f"time namespaces cannot be made here: {error}")
+    limit(network, "100mbit")
+    settings = {"mode": "free", "max_age": "20 s", "late": "stop"}
+    sets = ["--set", "clock.kind=paced", "--set", "duration=3 s"]
+    sets += [word for key, value in settings.items() for word in ("--set", f"links.{key}={value}")]
+    parts = [
+        network.part("ground", "--no-record", *sets, before=ahead),
+        network.part("onboard", "--no-record", *sets),
+    ]
+    for result, sign in zip([said(part) for part in parts], (-1, 1), strict=True):
+        assert result["success"], result["reason"]
+        (clock,) = result["clocks"].values()
+        assert abs(clock["offset_s"] - sign * 86400.0) < 1.0 + clock["uncertainty_s"]
+        assert result["links"][0]["late_ticks"] == 0 < result["links"][0]["received"]
+
+
 @pytest.mark.parametrize(("seconds", "lease"), [(0.4, "3 s"), (1.2, "3 s"), (4.0, "500 ms")])
 def test_a_cut_ends_a_run_if_it_outlasts_the_lease(
     network: Network, here: Path, seconds: float, lease: str

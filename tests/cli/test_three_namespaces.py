@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -69,16 +69,23 @@ class Network:
         """Pull the cable of a machine (``down``), or put it back (``up``)."""
         ip("-n", self.switch, "link", "set", machine, state)
 
-    def start(self, machine: str, *arguments: str) -> subprocess.Popen[str]:
-        command = ["ip", "netns", "exec", self.name(machine), sys.executable, "-m", "aloft"]
+    def start(
+        self, machine: str, *arguments: str, before: Sequence[str] = ()
+    ) -> subprocess.Popen[str]:
+        """Start aloft on a machine, by the command ``before`` that gives it something else of its own."""
+        inside = ["ip", "netns", "exec", self.name(machine), *before]
+        command = [*inside, sys.executable, "-m", "aloft"]
         process = subprocess.Popen(
             [*command, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         self.running.append(process)
         return process
 
-    def part(self, machine: str, *arguments: str) -> subprocess.Popen[str]:
-        return self.start(machine, "run", "graph.yaml", "--machine", machine, "--json", *arguments)
+    def part(
+        self, machine: str, *arguments: str, before: Sequence[str] = ()
+    ) -> subprocess.Popen[str]:
+        run = ("run", "graph.yaml", "--machine", machine, "--json")
+        return self.start(machine, *run, *arguments, before=before)
 
     def ask(self, machine: str, *arguments: str) -> dict[str, Any]:
         return said(self.start(machine, *arguments, "--json"))

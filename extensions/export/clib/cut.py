@@ -214,6 +214,11 @@ def _stubs(
                     "unit": each.unit,
                     "frame": _quantity(specs[block], port, field).frame,
                     "start": each.start,
+                    **(
+                        {"quaternion": True}
+                        if _quantity(specs[block], port, field).quaternion
+                        else {}
+                    ),
                 }
                 for each in found
             }

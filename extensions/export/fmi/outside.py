@@ -16,14 +16,14 @@ from ....runtime.language.parameters import Parameters, parameter
 from ....runtime.language.signals import DTYPES, signal_of
 from ....runtime.language.units import parse_unit
 
-_FIELD_KEYS = ("shape", "dtype", "unit", "frame", "start")
+_FIELD_KEYS = ("shape", "dtype", "unit", "frame", "start", "quaternion")
 
 
 class OutsideParameters(Parameters):
     """The outputs that blocks of the sub-graph read."""
 
     ports: dict[str, dict[str, dict[str, Any]]] = parameter(
-        text="for each output its fields: shape, dtype, unit, frame, start"
+        text="for each output its fields: shape, dtype, unit, frame, start, quaternion"
     )
 
     @field_validator("ports")

@@ -236,3 +236,8 @@ def test_what_is_no_signal(name: str, sizes: dict[str, int | str], text: str) ->
 def test_a_distribution_that_is_not_known() -> None:
     with pytest.raises(BlockError, match="does not know ROS 2 jazzi; it knows dashing, eloquent"):
         MessageType("std_msgs/msg/Bool", "jazzi", {})
+
+
+def test_a_list_of_size_zero_is_left_out() -> None:
+    scan = MessageType("sensor_msgs/msg/LaserScan", "jazzy", {"ranges": 3, "intensities": 0})
+    assert "ranges" in scan.signal.fields and "intensities" not in scan.signal.fields

@@ -9,12 +9,9 @@ measures the controller as it was at an earlier commit, in the same run.
 from __future__ import annotations
 
 import gc
-import io
 import json
-import os
 import subprocess
 import sys
-import tarfile
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -28,7 +25,7 @@ from numpy.typing import NDArray
 from ....blocks.control.dynamics import Dynamics
 from ....blocks.control.whole_body_controller import WholeBodyController
 from ....files.pip_line import pip_line
-from ....runtime.language.errors import AloftError
+from ..earlier_build import Build
 from ..full_program import FullMatrices
 from ..rows import Row
 from ..startup import time_process
@@ -129,9 +126,6 @@ def late_share(
     return late / count
 
 
-ROOT = Path(__file__).parents[3]
-
-
 class EarlierController:
     """The sources of a commit, in a temporary folder, and runs of their ``jump.yaml``.
 
@@ -143,21 +137,7 @@ class EarlierController:
     """
 
     def __init__(self, commit: str) -> None:
-        found = subprocess.run(
-            ["git", "-C", str(ROOT), "archive", "--format=tar", commit],
-            check=False, capture_output=True,
-        )  # fmt: skip
-        if found.returncode:
-            reason = found.stderr.decode(errors="replace").strip().splitlines() or ["git failed"]
-            raise AloftError(
-                f"the sources of {commit} are not at hand: {reason[-1]}; "
-                "--since needs a clone with its history"
-            )
-        self.commit = commit
-        self._folder = tempfile.TemporaryDirectory(prefix="aloft_")
-        with tarfile.open(fileobj=io.BytesIO(found.stdout)) as archive:
-            archive.extraction_filter = getattr(tarfile, "data_filter", None)  # not before 3.11.4
-            archive.extractall(Path(self._folder.name) / "aloft")
+        self.commit, self._build = commit, Build(commit)
 
     def run(self) -> dict[str, float]:
         """Run its jump once, in a process of its own; returns the median time of every block of the
@@ -166,12 +146,11 @@ class EarlierController:
         Raises:
             AssertionError: the run failed.
         """
-        folder = Path(self._folder.name)
+        folder = self._build.folder
         done = subprocess.run(
             [sys.executable, "-m", "aloft", "run", "aloft/graphs/jump.yaml", "--json"],
             check=False, cwd=folder, capture_output=True, text=True, timeout=600,
-            env={**os.environ, "PYTHONPATH": str(folder), "OMP_NUM_THREADS": "1",
-                 "OPENBLAS_NUM_THREADS": "1"},
+            env=self._build.environment(),
         )  # fmt: skip
         if done.returncode:
             raise AssertionError(f"the jump of {self.commit} failed: {done.stderr[-500:]}")
@@ -180,7 +159,7 @@ class EarlierController:
 
     def close(self) -> None:
         """Remove the sources."""
-        self._folder.cleanup()
+        self._build.close()
 
 
 CHUNK = 50

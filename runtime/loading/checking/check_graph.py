@@ -383,6 +383,7 @@ def _assemble(
         ticks=settings.ticks,
         robot=settings.robot,
         clock=settings.clock,
+        recording=settings.recording,
         file=graph.file,
         overrides=graph.overrides,
         unchecked=(*unchecked_wires(drafts), *questions(drafts)),

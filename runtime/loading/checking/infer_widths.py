@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import lru_cache
+from math import prod
 from typing import Any
 
 from ....files.nodes import ListNode, Node, ScalarNode, from_plain, plain
@@ -98,9 +100,9 @@ class Widths:
 
     def _width(self, flat: FlatBlock, block_type: type[Block], name: str) -> int | None:
         """Return a width, ``None`` while nothing says it."""
-        for key, info in block_type.Params.model_fields.items() if name == "n" else ():
+        for key in _lists_of(block_type) if name == "n" else ():
             entry = flat.parameters.get(key)
-            value = entry.value if entry is not None and info.annotation in _LISTS else None
+            value = entry.value if entry is not None else None
             if isinstance(value, ListNode) and value.items:
                 return len(value.items)
         for port, declared in block_type.inputs.items():
@@ -150,6 +152,8 @@ class Widths:
         shape = self._draft_of(source).shape(field) if field is not None else None
         if field is None or shape is None:
             return None
+        if not item.selection.indices:
+            return prod(shape)
         rows = self._names.get(str(field.shape[0]), ()) if field.shape else ()
         try:
             return int(select(Selection("", item.selection.indices), shape, rows).size)
@@ -158,7 +162,20 @@ class Widths:
 
 
 def open_widths(flat: FlatBlock, block_type: type[Block]) -> Iterator[str]:
-    """Yield the parameters that are sizes of a block's inputs and that the graph does not give."""
+    """Return the parameters that are sizes of a block's inputs and that the graph does not give."""
+    return (name for name in _widths_of(block_type) if flat.parameters.get(name) is None)
+
+
+@lru_cache(maxsize=1024)
+def _lists_of(block_type: type[Block]) -> tuple[str, ...]:
+    """Return the parameters that may be lists with a number for each of ``n`` elements."""
+    fields = block_type.Params.model_fields.items()
+    return tuple(name for name, info in fields if info.annotation in _LISTS)
+
+
+@lru_cache(maxsize=1024)
+def _widths_of(block_type: type[Block]) -> tuple[str, ...]:
+    """Return the parameters that are sizes of a class's inputs."""
     fields = block_type.Params.model_fields
     sizes = dict.fromkeys(
         size
@@ -166,10 +183,9 @@ def open_widths(flat: FlatBlock, block_type: type[Block]) -> Iterator[str]:
         for field in port.signal.fields.values()
         if len(field.shape) == 1 and isinstance(size := field.shape[0], str)
     )
-    for name in sizes:
-        info = fields.get(name)
-        if info is not None and info.annotation is int and flat.parameters.get(name) is None:
-            yield name
+    return tuple(
+        name for name in sizes if (info := fields.get(name)) is not None and info.annotation is int
+    )
 
 
 def _count(node: Node) -> int:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from pydantic import ValidationError
@@ -67,7 +68,7 @@ def check_parameters(
 def _refuse_truth_values(flat: FlatBlock, model: type[Parameters], problems: Problems) -> bool:
     """Report ``true`` or ``false`` in place of a number, which pydantic would take for 1 or 0."""
     ok = True
-    numbers = {n: info for n, info in declared_fields(model) if info.annotation in (int, float)}
+    numbers = _numbers(model)
     for path, node in _values(flat.parameters):
         info, value = numbers.get(path), node.value
         if info is not None and isinstance(value, bool):
@@ -81,6 +82,12 @@ def _refuse_truth_values(flat: FlatBlock, model: type[Parameters], problems: Pro
                 found=text_of(value),
             )
     return ok
+
+
+@lru_cache(maxsize=1024)
+def _numbers(model: type[Parameters]) -> Mapping[str, FieldInfo]:
+    """Return the parameters that are single numbers, by path."""
+    return {n: info for n, info in declared_fields(model) if info.annotation in (int, float)}
 
 
 def _values(node: MapNode, prefix: str = "") -> Iterator[tuple[str, ScalarNode]]:
@@ -99,14 +106,12 @@ def _refuse_beyond_64_bits(
 
     Seeds may have any size. The size of a signal is refused far earlier, by ``sizes``.
     """
-    ports = (*block_type.inputs.values(), *block_type.outputs.values(), *block_type.states.values())
-    sizes = {size for port in ports for f in port.signal.fields.values() for size in f.shape}
     ok = True
     for entry in flat.parameters:
         value = getattr(params, entry.key, None)
-        if entry.key in sizes | {"seed"} or not isinstance(value, int):
+        if not isinstance(value, int) or entry.key == "seed" or -(2**63) <= value < 2**63:
             continue
-        if not -(2**63) <= value < 2**63:
+        if entry.key not in _sizes(block_type):
             ok = False
             problems.add(
                 Code.BAD_PARAMETER,
@@ -119,6 +124,12 @@ def _refuse_beyond_64_bits(
                 found=text_of(value),
             )
     return ok
+
+
+def _sizes(block_type: type[Block]) -> set[str | int]:
+    """Return the sizes of a block's ports and states."""
+    ports = (*block_type.inputs.values(), *block_type.outputs.values(), *block_type.states.values())
+    return {size for port in ports for f in port.signal.fields.values() for size in f.shape}
 
 
 def _report(

@@ -18,8 +18,8 @@ from ....robots.description import (
 )
 from ...language.flat_graph import FlatGraph
 from ...language.requirements import fix_without_robot
-from ...language.stages import ClockSpec
-from ..reading.graph_file import ClockKeys, read_section
+from ...language.stages import ClockSpec, RecordingSpec
+from ..reading.graph_file import ClockKeys, RecordingKeys, read_section
 from ..reading.written import read_quantity
 
 
@@ -36,6 +36,7 @@ class Settings:
     clock: ClockSpec = field(default_factory=ClockSpec)
     folder: Path = Path()
     """Folder of the graph's file."""
+    recording: RecordingSpec = field(default_factory=RecordingSpec)
 
 
 def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
@@ -65,6 +66,7 @@ def read_settings(graph: FlatGraph, problems: Problems) -> Settings:
         _read_dimensions(graph, robot, problems),
         _read_clock(graph, problems),
         graph.folder,
+        _read_recording(graph, problems),
     )
 
 
@@ -106,6 +108,12 @@ def _read_clock(graph: FlatGraph, problems: Problems) -> ClockSpec:
     if graph.clock is None:
         return ClockSpec()
     return ClockSpec(**read_section(graph.clock, "clock", ClockKeys, problems))
+
+
+def _read_recording(graph: FlatGraph, problems: Problems) -> RecordingSpec:
+    if graph.recording is None:
+        return RecordingSpec()
+    return RecordingSpec(**read_section(graph.recording, "recording", RecordingKeys, problems))
 
 
 def read_robot(graph: FlatGraph, problems: Problems) -> RobotDescription | None:

@@ -16,7 +16,7 @@ from .machines import placed
 SUBGRAPH_SUFFIXES = (".yaml", ".yml")
 VALUES = ("rate", "duration", "robot", "actuators")
 """Keys of a graph that are one value each."""
-SECTIONS = ("dimensions", "clock", "machines", "links", "faults")
+SECTIONS = ("dimensions", "clock", "recording", "machines", "links", "faults")
 """Keys of a graph that are mappings."""
 
 

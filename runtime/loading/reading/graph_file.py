@@ -177,6 +177,14 @@ class ClockKeys(_Keys):
     hangs_after: Seconds = _key("the time after which a call of a block is taken to hang")
 
 
+class RecordingKeys(_Keys):
+    """Keys of the recorder."""
+
+    ring_bytes: Annotated[int, Field(ge=1 << 16, le=1 << 36, strict=True)] = _key(
+        "the largest ring between run and recorder, in bytes: 67108864"
+    )
+
+
 class LinkKeys(_Keys):
     """Keys of the policy on late messages."""
 
@@ -230,6 +238,7 @@ class GraphSections(_Keys):
 
     dimensions: dict[str, Annotated[int, Field(ge=1)]] = _key("sizes by name")
     clock: ClockKeys = _key("how the run is paced")
+    recording: RecordingKeys = _key("how the run is recorded")
     machines: dict[str, str] = _key("machines that share the graph: name and endpoint")
     place: dict[str, str] = _key("block or sub-graph: machine; wins over 'on'")
     links: Links = _key("how the machines keep together")

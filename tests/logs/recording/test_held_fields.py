@@ -9,11 +9,12 @@ from aloft.logs import RecordingError, read
 from aloft.logs.file import packed_rows
 from aloft.logs.file.held_fields import split_bus
 from aloft.logs.file.records import Content
-from aloft.logs.recording.recorder import RING_BYTES, Recorder
+from aloft.logs.recording.recorder import Recorder
 from aloft.logs.recording.writer import write_recording
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import replay
 from aloft.runtime.graph import load
+from aloft.runtime.language.stages import RecordingSpec
 from aloft.runtime.running.run_result import RunResult
 
 MODULE = """\
@@ -124,4 +125,10 @@ def test_the_ring_is_bounded_in_bytes(made: tuple[Path, RunResult]) -> None:
     assert recorder.link is not None and not recorder.dropped
     frame = 4 * (2 * 32 * 32 * 8 + 1024)
     assert recorder.link.ring.capacity < (1 << 16) + 2 * frame
-    assert RING_BYTES == 64 << 20
+    text = f"recording: {{ring_bytes: {1 << 17}}}\n" + (made[0] / "cam.yaml").read_text()
+    (made[0] / "small.yaml").write_text(text)
+    said = Recorder(made[0] / "e.rrd")
+    load(made[0] / "small.yaml").run(sinks=[said])
+    assert said.link is not None
+    assert abs(said.link.ring.capacity - recorder.link.ring.capacity - (1 << 16)) <= 64
+    assert RecordingSpec().ring_bytes == 64 << 20

@@ -1,10 +1,13 @@
 """``export.Outside``: outputs that somebody sets, their types, and wrong declarations."""
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+import aloft
+from aloft.extensions.export.clib.cut import cut
 from aloft.extensions.export.fmi.description import _unit
 from aloft.extensions.export.fmi.outside import Outside
 from aloft.runtime.language.units import BASE_UNITS, parse_unit
@@ -48,3 +51,19 @@ def test_degrees_celsius_of_an_fmu_are_no_kelvin() -> None:
     kelvin = _unit("K", SimpleNamespace(factor=1.0, offset=0.0, **powers))
     assert celsius is not None and kelvin is not None
     assert kelvin.matches(parse_unit("K")) and not celsius.matches(kelvin)
+
+
+def test_quaternions_from_outside_stay_quaternions(tmp_path: Path) -> None:
+    (tmp_path / "part.yaml").write_text(
+        "inputs: {turn: }\noutputs: {late: d.y}\n"
+        "blocks:\n  d: {use: blocks.Delay, with: {samples: 2}, in: {u: inputs.turn}}\n"
+    )
+    (tmp_path / "graph.yaml").write_text(
+        "rate: 100 Hz\nblocks:\n"
+        "  angles: {use: blocks.Constant, with: {value: [0.2 rad, 0.1 rad, 1 rad]}}\n"
+        "  q: {use: blocks.EulerToQuaternion, in: {u: angles.y}}\n"
+        "  part: {use: part.yaml, in: {turn: q.y}}\n"
+    )
+    alone = aloft.load(cut(str(tmp_path / "graph.yaml"), "part").text)
+    late = alone.run(duration=0.03).signal("part/d.y.value")
+    assert late.tolist() == [[0.0, 0.0, 0.0, 1.0]] * 3
