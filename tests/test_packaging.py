@@ -14,6 +14,9 @@ from pathlib import Path
 
 import pytest
 import yaml
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+from packaging.utils import canonicalize_name
 
 import aloft
 from aloft.mathematics.compiling.machine_code import process_triple
@@ -149,6 +152,29 @@ def test_one_version() -> None:
     assert yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"] == aloft.__version__
     major = aloft.__version__.rpartition(".")[0]
     assert f"| {major} | yes |" in (ROOT / "SECURITY.md").read_text()
+
+
+def test_the_lock_file_is_of_these_requirements() -> None:
+    """Whoever uses uv gets versions that fit: `uv lock` was run after the last change of pyproject.toml."""
+    lock = tomllib.loads((ROOT / "uv.lock").read_text())
+    (own,) = (package for package in lock["package"] if package["name"] == "aloft-robotics")
+    groups = PROJECT["dependency-groups"]["dev"]
+    asked = [
+        *PROJECT["project"]["dependencies"], *groups,
+        *(line for extra in PROJECT["project"]["optional-dependencies"].values() for line in extra),
+    ]  # fmt: skip
+    locked = {
+        (entry["name"], SpecifierSet(entry.get("specifier", "")))
+        for entry in (*own["metadata"]["requires-dist"], *own["metadata"]["requires-dev"]["dev"])
+    }
+    wanted = {
+        (canonicalize_name(requirement.name), requirement.specifier)
+        for requirement in map(Requirement, asked)
+    }
+    assert locked == wanted, "run: uv lock"
+    versions = {package["name"]: package.get("version") for package in lock["package"]}
+    for name, specifier in wanted - {("aloft-robotics", SpecifierSet(""))}:
+        assert specifier.contains(versions[name] or "", prereleases=True), (name, versions[name])
 
 
 def loaded_by(code: str) -> set[str]:

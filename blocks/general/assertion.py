@@ -17,6 +17,7 @@ from ...runtime.language.block import (
     UnmetRequirement,
 )
 from ...runtime.language.parameters import Parameters, ScalarOrVector, parameter
+from ...runtime.language.quantities import InputQuantities, OutputQuantities
 from ...runtime.language.signals import Field, Signal
 from .vectors import (
     Bounded,
@@ -24,6 +25,7 @@ from .vectors import (
     Flag,
     Vector,
     VectorParameters,
+    ask_for_lists,
 )
 
 
@@ -60,6 +62,12 @@ class Assertion(Bounded, Block):
         yield from super().requires(params, context)
         if params.lower is None and params.upper is None:
             yield UnmetRequirement("it has no bound", fix="with: {upper: 1.0}")
+
+    @classmethod
+    def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
+        """Ask for bounds one by one where the elements have unlike units."""
+        ask_for_lists(("lower", "upper"), params, inputs)
+        return {}
 
     @classmethod
     def example_parameters(cls) -> Mapping[str, object]:

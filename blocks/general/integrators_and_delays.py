@@ -17,6 +17,7 @@ from .vectors import (
     UnitOfInput,
     Vector,
     VectorParameters,
+    ask_for_lists,
 )
 
 
@@ -44,6 +45,7 @@ class Integrator(Bounded, Block):
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """Return the unit of the rate times a second."""
+        ask_for_lists(("initial", "lower", "upper"), params, inputs)
         u = inputs["u"]
         return {"y": u and u.times(SECOND)}
 
@@ -179,6 +181,7 @@ class UnitDelay(UnitOfInput, Block):
     """
 
     Params = InitialValueParameters
+    levels = ("initial",)
     params: InitialValueParameters
     u = Input(Vector, text="the signal to delay")
     y = Output(Vector, text="u one run ago")
@@ -216,6 +219,7 @@ class Delay(UnitOfInput, Block):
     class Params(InitialValueParameters):
         samples: int = parameter(1, ge=1, text="k, the delay in runs of the block")
 
+    levels = ("initial",)
     params: Params
     u = Input(Vector, text="the signal to delay")
     y = Output(Vector, text="u, k runs ago")
@@ -243,6 +247,7 @@ class SampleHold(UnitOfInput, Block):
     """
 
     Params = InitialValueParameters
+    levels = ("initial",)
     params: InitialValueParameters
     u = Input(Vector, text="the signal to sample")
     trigger = Input(Flag, text="takes a sample")

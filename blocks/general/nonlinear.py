@@ -32,6 +32,7 @@ class Saturation(Bounded, UnitOfInput, Block):
         lower: ScalarOrVector | None = live_parameter(None, text="the least output")
         upper: ScalarOrVector | None = live_parameter(None, text="the greatest output")
 
+    levels = ("lower", "upper")
     params: Params
     u = Input(Vector, text="the signal to bound")
     y = Output(Vector, text="u within the bounds")
@@ -49,6 +50,7 @@ class DeadZone(Bounded, UnitOfInput, Block):
         lower: ScalarOrVector = live_parameter(-0.5, text="begin of the zone")
         upper: ScalarOrVector = live_parameter(0.5, text="end of the zone")
 
+    levels = ("lower", "upper")
     params: Params
     u = Input(Vector, text="the signal that is passed on outside the zone")
     y = Output(Vector, text="distance of u beyond the zone")
@@ -65,6 +67,7 @@ class Backlash(UnitOfInput, Block):
     class Params(VectorParameters):
         width: ScalarOrVector = live_parameter(1.0, text="the play from one side to the other")
 
+    levels = ("width",)
     params: Params
     u = Input(Vector, text="position of the driving part")
     y = Output(Vector, text="position of the driven part")
@@ -115,6 +118,7 @@ class RateLimiter(UnitOfInput, Block):
         rising: ScalarOrVector = live_parameter(1.0, text="the fastest growth per second, positive")
         falling: ScalarOrVector = live_parameter(1.0, text="the fastest fall per second, positive")
 
+    levels = ("rising", "falling")
     params: Params
     u = Input(Vector, text="the signal to follow")
     y = Output(Vector, text="the signal that follows it")

@@ -271,12 +271,25 @@ class UnitFromParameters:
         return {"y": params.quantity()}
 
 
+def ask_for_lists(levels: Iterable[str], params: Parameters, inputs: InputQuantities) -> None:
+    """Ask about parameters in the unit of ``u`` that are one number, where its elements have unlike units."""
+    for name in levels:
+        value = getattr(params, name)
+        if isinstance(value, int | float) and value:  # zero is zero in every unit
+            inputs.question(
+                "u", f"{name} is {value:g} for all; give a list with one number for each element"
+            )
+
+
 class UnitOfInput:
-    """A block whose output ``y`` is the same quantity as its input ``u``."""
+    """A block whose output ``y`` is the same quantity as its input ``u``, and so are the parameters in ``levels``."""
+
+    levels: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def infer_units(cls, params: Parameters, inputs: InputQuantities) -> OutputQuantities:
         """Return the quantity of ``u``."""
+        ask_for_lists(cls.levels, params, inputs)
         return {"y": inputs["u"]}
 
 

@@ -266,6 +266,9 @@ def _numbers(name: str, message: Any, log: LogFile) -> Iterator[tuple[str, list[
         elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size:
             yield path, value.ravel().astype(float).tolist()
         elif isinstance(value, list) and value and isinstance(value[0], str):
-            log.texts[path] = value
+            if log.texts.setdefault(path, value) != value:
+                raise LogError(
+                    f"{log.path.name}: {path} changes from message to message, so its columns are not the same joints all along"
+                )
         elif hasattr(value, "__dataclass_fields__"):
             yield from _numbers(path, value, log)

@@ -15,13 +15,17 @@ class LogImu(Parameters):
     specific_force: Columns = parameter(text="three columns of the accelerometer [m/s^2]")
     sensor: str | None = parameter(
         None,
-        text="a sensor of the robot's description on the base: its place and turn are the IMU's",
+        text="a sensor of the robot's description: its link, place and turn are the IMU's",
+    )
+    link: str | None = parameter(
+        None,
+        text="the link that carries it, if no sensor is named, such as a chest; none: the base",
     )
     position: list[float] = parameter(
-        [0.0, 0.0, 0.0], unit="m", text="place from the base's origin, if no sensor is named"
+        [0.0, 0.0, 0.0], unit="m", text="place from its link's origin, if no sensor is named"
     )
     rpy: list[float] = parameter(
-        [0.0, 0.0, 0.0], unit="rad", text="turn from the base's axes: roll, pitch, yaw"
+        [0.0, 0.0, 0.0], unit="rad", text="turn from its link's axes: roll, pitch, yaw"
     )
 
 

@@ -23,6 +23,7 @@ from .columns import (
     stamps_of,
     with_hysteresis,
 )
+from .link_motion import imu_at_base, link_motion
 from .log_file import LogError, LogFile
 from .parameters import LogParameters
 
@@ -33,7 +34,7 @@ GAP = 5.0
 
 
 class PlayedRows(NamedTuple):
-    """What every tick plays, n rows: IMU (n, 6), joints (n, n_joints), switches (n, n_contacts), pose of the base
+    """Values that every tick plays, n rows: IMU (n, 6), joints (n, n_joints), switches (n, n_contacts), pose of the base
     (n, 7) with its quaternion x, y, z, w, and its twist (n, 6)."""
 
     imu: Array2D
@@ -269,12 +270,22 @@ def _contacts(player: _Player) -> dict[int, _Series]:
     return found
 
 
-def _mounting(player: _Player) -> tuple[Array, Array] | None:
-    """Return turn (3, 3) and place (3,) [m] of the IMU in the base's axes."""
+def _mounting(player: _Player) -> tuple[str, Array, Array] | None:
+    """Return the link that carries the IMU, and its turn (3, 3) and place (3,) [m] in the link's axes."""
     imu, robot = player.params.imu, player.robot
     if imu is None or imu.sensor is None:
+        link = robot.base if imu is None or imu.link is None else imu.link
+        names = [each.name for each in robot.links]
+        if link not in names:
+            near = get_close_matches(link, names, 1, 0.5)
+            player.played.problems.append(
+                LogProblem(f"{robot.name} has no link {link}", "imu.link", found=link,
+                           expected="a link of the robot", fix=near[0] if near else "")
+            )  # fmt: skip
+            return None
         angles = (0.0, 0.0, 0.0) if imu is None else imu.rpy
-        return rotation_of_rpy(np.array([angles]))[0], np.array(imu.position if imu else (0.0,) * 3)
+        place = np.array(imu.position if imu else (0.0,) * 3)
+        return link, rotation_of_rpy(np.array([angles]))[0], place
     mounted = robot.sensors.mounted
     if imu.sensor not in mounted:
         near = get_close_matches(imu.sensor, mounted, 3, 0.5) or list(mounted)[:6]
@@ -288,24 +299,31 @@ def _mounting(player: _Player) -> tuple[Array, Array] | None:
         )
         return None
     mount = mounted[imu.sensor]
-    if mount.link != robot.links[0].name:
-        player.played.problems.append(
-            LogProblem(
-                f"{imu.sensor} is not on the base",
-                "imu.sensor",
-                expected=robot.links[0].name,
-                found=mount.link,
-            )
-        )
-        return None
-    return rotation_of(np.array([mount.orientation]))[0], np.array(mount.position)
+    return mount.link, rotation_of(np.array([mount.orientation]))[0], np.array(mount.position)
+
+
+def _joints_at(
+    player: _Player, columns: Sequence[int], joints: Sequence[_Series | None], stamps: Array1D
+) -> tuple[Array, Array]:
+    """Return angles and speeds of all joints at some stamps (n, n_joints)."""
+    angles, speeds = joints[:2]
+    position = np.tile(np.array(player.robot.standing_position, np.float64), (len(stamps), 1))
+    velocity = np.zeros_like(position)
+    own = [k for k, column in enumerate(columns) if column >= 0]
+    taken = [columns[k] for k in own]
+    if angles is not None and own:
+        position[:, own] = at_times(angles.stamps, angles.values, stamps)[:, taken]
+        if speeds is None:
+            speeds = _Series(angles.stamps, np.gradient(angles.values, angles.stamps, axis=0))
+        velocity[:, own] = at_times(speeds.stamps, speeds.values, stamps)[:, taken]
+    return position, velocity
 
 
 def _rows(
     player: _Player,
     gyro: _Series | None,
     force: _Series | None,
-    mounting: tuple[Array, Array],
+    mounting: tuple[str, Array, Array],
     columns: Sequence[int],
     joints: Sequence[_Series | None],
     contacts: dict[int, _Series],
@@ -315,15 +333,22 @@ def _rows(
     robot, played, count = player.robot, player.played, len(player.times)
     imu, imu_valid, age = np.zeros((count, 6)), np.ones(count, bool), np.zeros(count)
     if gyro is not None and force is not None:
-        rotation, lever = mounting
+        link, rotation, lever = mounting
+        when = gyro.stamps
         rates = gyro.values @ rotation.T
         forces = _Series(force.stamps, force.values @ rotation.T)
-        if lever.any():
+        if link != robot.base:
+            at = at_times(gyro.stamps, rates, force.stamps)
+            moving = _joints_at(player, columns, joints, force.stamps)
+            motion = link_motion(robot, link, lever, *moving)
+            rates, carried = imu_at_base(motion, force.stamps, at, forces.values)
+            when, forces = force.stamps, _Series(force.stamps, carried)
+        elif lever.any():
             at = at_times(gyro.stamps, rates, force.stamps)
             turning = np.gradient(at, force.stamps, axis=0)
             moved = forces.values - np.cross(at, np.cross(at, lever)) - np.cross(turning, lever)
             forces = _Series(force.stamps, moved)
-        imu[:, :3] = player.on_ticks(_Series(gyro.stamps, rates))
+        imu[:, :3] = player.on_ticks(_Series(when, rates))
         imu[:, 3:] = player.on_ticks(forces)
         repeated = repeats_of(gyro.values)
         played.imu_repeats = float(repeated.mean())

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...logs.file.header import make_header
 from ...logs.file.row_codec import pack
 from ...logs.recording.recorder import Recorder
 from ...runtime.graph import load
@@ -29,6 +30,7 @@ from ...runtime.running.memory import BoundGraph
 from ...runtime.running.run_result import RunResult
 from ...runtime.running.sink import Sink
 from ...runtime.testing.allocations import count_array_allocations
+from .recording_peers import recording_peers
 from .rows import Row
 
 COST_GOAL = 2.0
@@ -55,7 +57,7 @@ def recorder(seconds: float = 60.0, rounds: int = 30) -> list[Row]:
     with TemporaryDirectory() as folder:
         return [
             *cost(graph, Path(folder), rounds),
-            *packing(graph),
+            *packing(graph, Path(folder)),
             *paced(graph, Path(folder), seconds),
         ]
 
@@ -131,11 +133,12 @@ def _drain(sink: Recorder) -> None:
         time.sleep(1e-3)
 
 
-def packing(graph: CheckedGraph) -> list[Row]:
-    """Measure size and time of the packed rows, beside Arrow's of the same columns."""
+def packing(graph: CheckedGraph, folder: Path) -> list[Row]:
+    """Measure size and time of the packed rows, beside Arrow's of the same columns, and of whole files, beside
+    those of other writers."""
     result = Executor(graph).run(PACKED_TICKS)
     result.raise_if_failed()
-    assert result.log is not None
+    assert result.log is not None and result.log.layout is not None
     rows = result.log.rows()
     batches = [rows[first : first + PACKED_BATCH] for first in range(0, len(rows), PACKED_BATCH)]
     size, cost = _packed(lambda batch: pack(0, batch), batches)
@@ -150,7 +153,8 @@ def packing(graph: CheckedGraph) -> list[Row]:
             Row("packed rows, size", size, "MB", peer, size / its_size, goal=1.0, note=raw),
             Row("packed rows, time", cost, "us/tick", peer, cost / its_cost, goal=1.0),
         ]
-    return found
+    header = make_header(graph, result.log.layout, rows[0].tobytes())
+    return found + recording_peers(header, rows, folder)
 
 
 def _packed(

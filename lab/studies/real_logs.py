@@ -1,9 +1,10 @@
-"""Estimators on the logs of a real robot: the tables of docs/real_logs.md.
+"""The tables and pictures of docs/real_logs.md: estimators, dynamics and a swing-up on logs of real robots.
 
 ::
 
-    python -m aloft.lab.studies.real_logs            # writes the tables into docs/real_logs.md
-    python -m aloft.lab.studies.real_logs --print    # prints them
+    python -m aloft.lab.studies.real_logs            # writes tables and pictures; some minutes
+    python -m aloft.lab.studies.real_logs --print    # prints the tables
+    python -m aloft.lab.studies.real_logs dynamics swing_up   # only these parts
 
 It needs ``shared/data`` beside the project's folder, whose logs are public (``docs/real_logs.md`` says where).
 """
@@ -12,169 +13,62 @@ from __future__ import annotations
 
 import argparse
 import re
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-from ... import load
+from ...plotting import Curve, Panel, save_panels
+from . import DATA, ROOT, icub_estimators, pendulum_dynamics, swing_up
 
-ROOT = Path(__file__).resolve().parents[2]
-DATA = ROOT.parent / "shared" / "data"
-ESTIMATORS = ("StateEstimator", "InvariantKalmanFilter", "ComplementaryFilter")
-RATES = (100, 250, 500, 1000, 2000)
-LOGS = (
-    ("walk", "walking.mat", 0.0),
-    ("walk, from 6.1 s", "walking.mat", 6.1),
-    ("walk, from 6.9 s", "walking.mat", 6.9),
-    ("walk, from 8.0 s", "walking.mat", 8.0),
-    ("sway", "com-sinusoid.mat", 0.0),
-)
-JOINTS = [
-    "neck_pitch",
-    "neck_roll",
-    "neck_yaw",
-    "torso_pitch",
-    "torso_roll",
-    "torso_yaw",
-    "l_shoulder_pitch",
-    "l_shoulder_roll",
-    "l_shoulder_yaw",
-    "l_elbow",
-    "r_shoulder_pitch",
-    "r_shoulder_roll",
-    "r_shoulder_yaw",
-    "r_elbow",
-    "l_hip_pitch",
-    "l_hip_roll",
-    "l_hip_yaw",
-    "l_knee",
-    "l_ankle_pitch",
-    "l_ankle_roll",
-    "r_hip_pitch",
-    "r_hip_roll",
-    "r_hip_yaw",
-    "r_knee",
-    "r_ankle_pitch",
-    "r_ankle_roll",
-]
-"""The order of the logs' columns."""
-SOLE = "[[0.12, 0.04, 0], [0.12, -0.04, 0], [-0.06, 0.04, 0], [-0.06, -0.04, 0]]"
-ICUB = """
-file: {model}
-name: icub
-text: iCubGenova04, of its URDF
-base_joint: floating
-feet:
-  - {{name: r_sole, at: r_sole, points: {sole}}}
-  - {{name: l_sole, at: l_sole, points: {sole}}}
-profiles:
-  rated: {{friction: 0, damping: 0}}
-sensors:
-  imu: true
-  switches: true
-  root_link_imu_acc:
-    kind: imu
-    link: base_link
-    position: [0.085155, -0.011, -0.112309]
-    orientation: [0.612372, -0.612372, 0.353553, -0.353553]
-"""
+PARTS = ("estimators", "dynamics", "swing_up")
 
 
-def write_robot(folder: Path) -> Path:
-    """Write the iCub's description into a folder."""
-    file = folder / "icub.yaml"
-    file.write_text(ICUB.format(model=DATA / "icub" / "model.urdf", sole=SOLE))
-    return file
-
-
-def graph_of(robot: Path, log: str, rate: int, estimator: str, begin: float) -> dict[str, Any]:
-    """Return the graph in which an estimator follows a log."""
-    force = {"closes": "150 N", "opens": "120 N"}
-    return {
-        "rate": f"{rate} Hz",
-        "robot": str(robot),
-        "blocks": {
-            "robot": {
-                "use": "hal.LogRobot",
-                "with": {
-                    "file": str(DATA / "icub" / log),
-                    "clock": {"stamps": "estimatorJointsTime", "even": True},
-                    "begin": begin,
-                    "joints": {
-                        "names": JOINTS,
-                        "position": "estimatorJointsPos",
-                        "velocity": "estimatorJointsVel",
-                    },
-                    "imu": {
-                        "angular_velocity": "imuOmega",
-                        "specific_force": "imuAcc",
-                        "sensor": "root_link_imu_acc",
-                    },
-                    "contacts": {
-                        "l_sole": {"force": "lfForceZ", **force},
-                        "r_sole": {"force": "rfForceZ", **force},
-                    },
-                    "truth": {"position": "linkBasePos", "rpy": "linkBaseRot"},
-                },
-            },
-            "estimator": {
-                "use": f"blocks.{estimator}",
-                "in": {
-                    "imu": "robot.imu",
-                    "joints": "robot.joints",
-                    "contacts": {"active": "robot.contacts.closed"},
-                },
-            },
-            "score": {
-                "use": "blocks.EstimatorScore",
-                "with": {"align": "start"},
-                "in": {"truth": "robot.truth", "base": "estimator.base"},
-            },
-        },
-    }
-
-
-def metrics_of(robot: Path, log: str, rate: int, estimator: str, begin: float = 0.0) -> Any:
-    """Return the metrics of an estimator on a log."""
-    return load(graph_of(robot, log, rate, estimator, begin)).run().metrics
-
-
-def rows() -> Iterator[str]:
-    """Give the lines of the table: position errors, and the tilt at 500 Hz."""
-    yield (
-        "| log | estimator | "
-        + " | ".join(f"{rate} Hz" for rate in RATES)
-        + " | tilt [deg] | end [mm] |"
-    )
-    yield "|---|---|" + "---|" * (len(RATES) + 2)
-    with tempfile.TemporaryDirectory() as folder:
-        robot = write_robot(Path(folder))
-        for name, log, begin in LOGS:
-            for estimator in ESTIMATORS:
-                found = {rate: metrics_of(robot, log, rate, estimator, begin) for rate in RATES}
-                errors = [f"{1e3 * found[rate]['estimator_position_rms_m']:.1f}" for rate in RATES]
-                tilt = 57.29578 * found[500]["estimator_tilt_rms_rad"]
-                end = 1e3 * found[500]["estimator_position_end_m"]
-                yield f"| {name} | `{estimator}` | {' | '.join(errors)} | {tilt:.2f} | {end:.0f} |"
+def _dynamics(picture: Path | None) -> Iterator[str]:
+    found = pendulum_dynamics.identified()
+    if picture is not None:
+        time, seen, predicted = pendulum_dynamics.held_out_curves(found)
+        panels = [
+            Panel(f"torque of joint {j + 1} [N m]",
+                  [Curve("measured", time, seen[:, j]), Curve("by the fit", time, predicted[:, j])])
+            for j in (0, 1)
+        ]  # fmt: skip
+        save_panels(panels, "A swing-up that the fit did not see, below 10 Hz", picture)
+    yield from pendulum_dynamics.rows(found)
 
 
 def main() -> None:
-    """Write the tables."""
+    """Write the tables and pictures."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--print", action="store_true", help="print them, write nothing")
+    parser.add_argument(
+        "parts", nargs="*", choices=[*PARTS, []], help="parts to make; all by default"
+    )
+    parser.add_argument("--print", action="store_true", help="print the tables, write nothing")
     arguments = parser.parse_args()
     if not DATA.is_dir():
         raise SystemExit(
             "there is no folder shared/data beside the project's: see docs/real_logs.md"
         )
-    text = "\n".join(rows())
-    if arguments.print:
-        print(text)
-        return
-    page = ROOT / "docs" / "real_logs.md"
-    mark = re.compile(r"(<!-- estimators -->\n).*?(<!-- end of estimators -->)", re.DOTALL)
-    page.write_text(mark.sub(lambda found: f"{found[1]}{text}\n{found[2]}", page.read_text()))
+    docs = ROOT / "docs"
+    for part in arguments.parts or PARTS:
+        picture = None if arguments.print else docs / f"real_logs_{part}.svg"
+        if part == "estimators":
+            lines = icub_estimators.rows()
+            if picture is not None:
+                icub_estimators.draw(picture)
+        elif part == "dynamics":
+            lines = _dynamics(picture)
+        else:
+            lines = swing_up.rows(picture)
+        text = "\n".join(lines)
+        if arguments.print:
+            print(text, flush=True)
+            continue
+        page = docs / "real_logs.md"
+        mark = re.compile(rf"(<!-- {part} -->\n).*?(<!-- end of {part} -->)", re.DOTALL)
+        written = page.read_text()
+        before, after = mark.split(written)[0], mark.split(written)[-1]
+        found = mark.search(written)
+        assert found is not None
+        page.write_text(f"{before}{found[1]}{text}\n{found[2]}{after}")
 
 
 if __name__ == "__main__":

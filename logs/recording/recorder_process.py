@@ -51,7 +51,7 @@ BATCH, BATCH_BYTES = 1024, 1 << 24
 SLOW_FLUSH = 4.0
 """Number of flush periods for which ticks may wait that are fewer than those of one period of the
 graph."""
-INDEXED_TICKS = 1_000_000
+INDEXED_TICKS = 200_000
 """Ticks of a file, at most, that gets Rerun's index: it is made in memory, of every chunk."""
 DRAW_PERIOD = 10.0
 """Seconds between two pieces of what the viewer shows: each costs the viewer time and memory."""

@@ -226,10 +226,11 @@ class ArrayFunctions(ArrayEquations):
         total: ast.expr = ast.Name(names["total"], ast.Load())
         self._kinds[names["total"]] = NUMBER
         if name == "mean":
-            count = cloned(sizes[0])
-            for size in sizes[1:]:
-                count = ast.BinOp(count, ast.Mult(), size)  # type: ignore[arg-type]  # known
-            total = ast.BinOp(total, ast.Div(), count)  # type: ignore[arg-type]  # known
+            first, *others = (cloned(size) for size in sizes if size is not None)
+            count = first
+            for size in others:
+                count = ast.BinOp(count, ast.Mult(), size)
+            total = ast.BinOp(total, ast.Div(), count)
         if name == "norm":
             total = self._number_call(ast.Call(total, [total], []), "sqrt")
         if name in ("mean", "norm"):

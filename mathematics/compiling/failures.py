@@ -9,21 +9,24 @@ from typing import NamedTuple
 class Failure(IntEnum):
     """Why compiled code ends a run."""
 
-    DIVISION = 0
+    DIVIDED_BY_ZERO = 0
     TOO_LARGE = 1
-    DOMAIN = 2
-    RANGE = 3
-    SLICE = 4
+    OUT_OF_DOMAIN = 2
+    OUT_OF_RANGE = 3
+    WRONG_LENGTH = 4
     NUMBA = 5
 
 
 FAILURES: dict[Failure, tuple[type[Exception], str]] = {
-    Failure.DIVISION: (ZeroDivisionError, "divided by zero"),
+    Failure.DIVIDED_BY_ZERO: (ZeroDivisionError, "divided by zero"),
     Failure.TOO_LARGE: (OverflowError, "got a whole number that does not fit into 64 bits"),
-    Failure.DOMAIN: (ValueError, "called a function outside of its domain"),
-    Failure.RANGE: (OverflowError, "got a number beyond the largest float"),
+    Failure.OUT_OF_DOMAIN: (ValueError, "called a function outside of its domain"),
+    Failure.OUT_OF_RANGE: (OverflowError, "got a number beyond the largest float"),
     Failure.NUMBA: (RuntimeError, "called a numba function that raised an error"),
-    Failure.SLICE: (IndexError, "met a slice of another length than what it is combined with"),
+    Failure.WRONG_LENGTH: (
+        IndexError,
+        "met a slice of another length than what it is combined with",
+    ),
 }
 """The error that Python would raise, and what is said of the kernel."""
 

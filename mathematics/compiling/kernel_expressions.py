@@ -335,7 +335,7 @@ class ExpressionTranslator:
             if function.__name__ == "demand":
                 found, wanted = (self._value(each) for each in node.args)
                 differ = self._code.compare("NotEq", found, wanted)
-                self._code.fail_if(differ.parts[0], Failure.SLICE)
+                self._code.fail_if(differ.parts[0], Failure.WRONG_LENGTH)
                 return NOTHING
         arguments = [self._value(each) for each in node.args]
         try:

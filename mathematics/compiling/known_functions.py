@@ -31,7 +31,7 @@ def _function(name: str) -> Translation:
     return write
 
 
-def _checked(name: str, pole: Failure = Failure.RANGE) -> Translation:
+def _checked(name: str, pole: Failure = Failure.OUT_OF_RANGE) -> Translation:
     """Return a function of ``math``, which reports arguments outside of its domain."""
     plain = _function(name)
 
@@ -47,7 +47,7 @@ def _checked(name: str, pole: Failure = Failure.RANGE) -> Translation:
 def _root(code: FunctionCode, arguments: Sequence[Value]) -> Value:
     (value,) = (code.convert(each, FLOAT) for each in arguments)
     if value.constant is None or value.constant < 0.0:
-        code.fail_if(code.result(f"fcmp olt double {value.parts[0]}, 0.0"), Failure.DOMAIN)
+        code.fail_if(code.result(f"fcmp olt double {value.parts[0]}, 0.0"), Failure.OUT_OF_DOMAIN)
     return _SAME["sqrt"](code, [value])
 
 
@@ -134,11 +134,11 @@ _LLVM = {
 _SAME = {name: _function(_LLVM[name]) for name in _LLVM if name != "log2"} | {
     name: _function(name) for name in ("tan", "sinh", "cosh", "tanh", "log10", "log1p", "expm1")
 }
-_POLE = dict.fromkeys(("log", "log2", "log10", "log1p", "atanh"), Failure.DOMAIN)
+_POLE = dict.fromkeys(("log", "log2", "log10", "log1p", "atanh"), Failure.OUT_OF_DOMAIN)
 _NEVER = ("tanh", "atan", "atan2", "asinh", "copysign")
 _MATH = {
     name: _function(_LLVM.get(name, name)) if name in _NEVER
-    else _checked(_LLVM.get(name, name), _POLE.get(name, Failure.RANGE))
+    else _checked(_LLVM.get(name, name), _POLE.get(name, Failure.OUT_OF_RANGE))
     for name in (
         "sin", "cos", "tan", "exp", "exp2", "log", "log2", "log10", "log1p", "expm1", "sinh", "cosh", "tanh",
         "asin", "acos", "atan", "atan2", "asinh", "acosh", "atanh", "hypot", "fmod", "copysign",

@@ -219,7 +219,7 @@ class CodeLines:
         self.write(f"br i1 {condition.parts[0]}, label %{yes}, label %{no}")
         self.reachable = False
 
-    def fail_if(self, condition: str, failure: Failure = Failure.DIVISION) -> None:
+    def fail_if(self, condition: str, failure: Failure = Failure.DIVIDED_BY_ZERO) -> None:
         """Report a failure where a condition holds."""
         if len(self.sites) < MOST_SITES:
             self.sites.append(Site(failure, self.line))

@@ -181,7 +181,7 @@ class NumberCode(CodeLines):
     def _shift(self, name: str, a: Value, b: Value) -> tuple[str, int]:
         x, y, r = a.parts[0], b.parts[0], self.result
         if b.constant is None and not b.counts:
-            self.fail_if(r(f"icmp slt i64 {y}, 0"), Failure.DOMAIN)
+            self.fail_if(r(f"icmp slt i64 {y}, 0"), Failure.OUT_OF_DOMAIN)
         elif not b.counts:
             raise NotCompilable("a shift goes by no negative number")
         if name == "RShift":
@@ -211,7 +211,7 @@ class NumberCode(CodeLines):
             if a.constant != 2 or not (b.counts or b.type == INT):
                 raise NotCompilable("of powers of whole numbers there are x ** 3 and 2 ** n")
             if not b.counts:  # Python makes a fraction of it
-                self.fail_if(self.result(f"icmp slt i64 {b.parts[0]}, 0"), Failure.DOMAIN)
+                self.fail_if(self.result(f"icmp slt i64 {b.parts[0]}, 0"), Failure.OUT_OF_DOMAIN)
             if b.bits > _LARGEST_SHIFT:
                 beyond = self.result(f"icmp sgt i64 {b.parts[0]}, 62")
                 self.fail_if(beyond, Failure.TOO_LARGE)
@@ -224,7 +224,7 @@ class NumberCode(CodeLines):
         return made
 
     def in_domain(
-        self, result: Value, arguments: Sequence[Value], pole: Failure = Failure.RANGE
+        self, result: Value, arguments: Sequence[Value], pole: Failure = Failure.OUT_OF_RANGE
     ) -> None:
         """Report a result that is no number although the arguments are, and one that is infinite
         although they are finite, as Python's ``math`` does."""
@@ -233,7 +233,7 @@ class NumberCode(CodeLines):
         none = r(f"fcmp uno double {made}, 0.0")
         for each in numbers:
             none = r(f"and i1 {none}, {each}")
-        self.fail_if(none, Failure.DOMAIN)
+        self.fail_if(none, Failure.OUT_OF_DOMAIN)
         infinity = number(math.inf).parts[0]
         sizes = [
             self.call("llvm.fabs.f64", "double", f"double {each}")

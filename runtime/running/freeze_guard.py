@@ -16,7 +16,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ...mathematics.compiling.fingerprint import closure
+from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.compiling.kernel_registry import written_code
 from ...processes.child_process import ChildProcess
+from ..language.extensions import is_own
 from ..language.stages import CheckedGraph
 from .failures import INSTALLED
 from .memory import BoundGraph, nameless_memory
@@ -71,7 +75,8 @@ class FreezeGuard(Sink):
         self._running[:] = bound.running
         bound.running = self._running
         with suppress(OSError):  # it could not start; the run goes on without it
-            self._pipe.write(json.dumps(_describe_graph(self._graph)).encode() + b"\n")
+            about = {**_describe_graph(self._graph), "kernels": _users_kernels(self._graph, bound)}
+            self._pipe.write(json.dumps(about).encode() + b"\n")
             self._pipe.flush()
         self._beats.start()
 
@@ -108,3 +113,23 @@ def _describe_graph(graph: CheckedGraph) -> dict[str, object]:
         blocks.append((spec.path, getattr(module, "__file__", "") or "", spec.block_type.__name__))
     about = {"graph": graph.name, "blocks": blocks, "installed": list(INSTALLED)}
     return {**about, "order": list(graph.order)}
+
+
+def _users_kernels(graph: CheckedGraph, bound: BoundGraph) -> dict[str, list[tuple[str, int]]]:
+    """Return the file and the first line of the kernels of each user's block, and of those that they call:
+    compiled code has no stack to read. Loops of aloft's own kernels end."""
+    found: dict[str, list[tuple[str, int]]] = {}
+    for spec in graph.blocks:
+        block = bound.blocks.get(spec.path)
+        if block is None or is_own(spec.block_type.__module__):
+            continue
+        calls = (*getattr(block, "kernel_calls", ()), *getattr(block, "update_calls", ()))
+        codes = [
+            written_code(function)
+            for call in calls
+            if isinstance(call, KernelCall)
+            for function in closure(call.kernel)
+            if not is_own(function.__module__)
+        ]
+        found[spec.path] = [(code.co_filename, code.co_firstlineno) for code in codes]
+    return found

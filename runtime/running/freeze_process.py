@@ -95,6 +95,7 @@ def _report(description: dict[str, object], stacks: str, limit: float, as_json: 
         "(clock.hangs_after allows longer); the process is killed"
     )
     place = f"{file}:{line}" if file else ""
+    place = " or ".join(dict.fromkeys(_loops(description, blocks))) or place
     sys.stderr.write(f"\nno success: {reason}\n" + (f"  it is at {place}\n" if place else ""))
     if as_json:
         block = blocks[0] if len(blocks) == 1 else ""
@@ -146,6 +147,29 @@ def _in_chain(description: dict[str, object], frames: list[tuple[str, int, str]]
         return []
     place = int.from_bytes(os.pread(shared, 8, 0), sys.byteorder, signed=True)
     return order[place : place + 1] if place >= 0 else []
+
+
+def _loops(description: dict[str, object], blocks: list[str]) -> list[str]:
+    """Return the places of the loops in the kernels of users' blocks, which may have no end: those with
+    ``while``, or where there is none those with ``for``."""
+    kernels = description.get("kernels", {})
+    assert isinstance(kernels, dict)
+    found: dict[type, list[str]] = {ast.While: [], ast.For: []}
+    for file, first in (each for path in blocks for each in kernels.get(path, ())):
+        try:
+            with open(file, encoding="utf-8") as source:
+                tree = ast.parse(source.read())
+        except (OSError, SyntaxError, ValueError):
+            continue
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef) and first in (
+                node.lineno,
+                *(each.lineno for each in node.decorator_list),
+            ):
+                for each in ast.walk(node):
+                    if type(each) in found:
+                        found[type(each)].append(f"{file}:{each.lineno}")  # type: ignore[attr-defined]  # a loop
+    return found[ast.While] or found[ast.For]
 
 
 def _class_at(file: str, line: int) -> str:

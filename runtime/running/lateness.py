@@ -16,11 +16,12 @@ FIRST_BITS, LAST_BITS = 11, 30
 """Bits of the shortest and the longest lateness [ns] that are told apart: 1 us to 1.07 s."""
 BUCKETS = 8 * (LAST_BITS - FIRST_BITS + 1) + 2
 """Buckets: below 1 us, eight an octave, and above a second."""
+_SHORTEST, _OFFSET = 1 << (FIRST_BITS - 1), 8 * FIRST_BITS + 7
 
 
 @dataclass(frozen=True)
 class TickLateness:
-    """How late the ticks of a run began.
+    """The lateness of the ticks of a run.
 
     Attributes:
         ticks: how many had a deadline; the first one, and the first after a pause, have none.
@@ -108,15 +109,16 @@ class LatenessCounter:
 
         Returns whether it is late.
         """
-        bits = lateness.bit_length()
-        try:
-            if bits < FIRST_BITS:
-                self.counts[0] += 1
-            else:  # the leading bit and three more select the bucket
-                self.counts[(bits << 3) + (lateness >> (bits - 4)) - 8 * FIRST_BITS - 7] += 1
-        except IndexError:
-            self.counts[-1] += 1
-        self.longest = max(self.longest, lateness)
+        if lateness < _SHORTEST:
+            self.counts[0] += 1
+        else:  # the leading bit and three more select the bucket
+            bits = lateness.bit_length()
+            try:
+                self.counts[(bits << 3) + (lateness >> (bits - 4)) - _OFFSET] += 1
+            except IndexError:
+                self.counts[-1] += 1
+        if lateness > self.longest:  # noqa: PLR1730  # a call of max would take as long as all of this
+            self.longest = lateness
         if lateness > self.limit:
             self.late += 1
             return True

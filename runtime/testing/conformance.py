@@ -21,7 +21,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from traceback import extract_tb
 from types import CodeType, FunctionType
@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, RootModel, ValidationError
 
 from ...mathematics.compiling.compile_calls import compile_calls
+from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.compiling.kernel_registry import arguments_of
 from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import find_robot
@@ -43,6 +44,7 @@ from ..language.requirements import unmet_requirements
 from ..language.signals import Field
 from ..running.finite import FiniteCheck
 from ..running.live_parameters import LiveParameters
+from . import numpy_oracle
 from .allocations import count_array_allocations
 from .bench import BlockBench
 
@@ -247,6 +249,38 @@ def _deterministic(subject: Subject) -> None:
         subject.expect(one == other, f"two instances with equal inputs differ in tick {tick}")
 
 
+def _kernels(subject: Subject) -> None:
+    """Check that machine code gives the bytes of plain Python, and that both are what NumPy makes of the kernels as
+    they are written."""
+    calls = _calls_of(subject.bench().block)
+    if not calls:
+        return
+    pairs = zip(
+        subject.trace(subject.bench()), subject.trace(subject.bench(plain=True)), strict=True
+    )
+    for tick, (one, other) in enumerate(pairs):
+        subject.expect(one == other, f"machine code and plain Python differ in tick {tick}")
+    bench = subject.bench(plain=True)
+    for call in _calls_of(bench.block):
+        call.run = partial(_judged, subject, call, call.run)
+    subject.trace(bench)
+
+
+def _calls_of(block: Block) -> list[KernelCall]:
+    calls = (*getattr(block, "kernel_calls", ()), *getattr(block, "update_calls", ()))
+    return [each for each in calls if isinstance(each, KernelCall)]
+
+
+def _judged(subject: Subject, call: KernelCall, run: Callable[[], Any]) -> None:
+    before = numpy_oracle.copied(call.arguments)
+    run()
+    try:
+        wrong = numpy_oracle.difference(call.kernel, before, call.arguments)
+    except numpy_oracle.NotJudged:
+        return
+    subject.expect(not wrong, f"{call.name} makes {wrong}")
+
+
 def _restored(subject: Subject) -> None:
     """Check that a block restored from a snapshot goes on as it did then, and so does a new
     instance."""
@@ -344,6 +378,7 @@ CASES: Mapping[str, Callable[[Subject], None]] = {
     "inputs kept": _inputs_kept,
     "machine": _machine,
     "deterministic": _deterministic,
+    "kernels": _kernels,
     "restored": _restored,
     "live parameters": _live_parameters,
     "array allocations": _array_allocations,

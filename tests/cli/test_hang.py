@@ -90,6 +90,9 @@ def test_a_kernel_that_does_not_end(
     assert found is not None, result["reason"]
     # one by one the stack shows the class alone, which three blocks have
     assert found[1] == ("'arm'" if not options else "'leg' or 'arm' or 'hand'")
+    assert (
+        result["error"]["where"] == f"{Path.cwd()}/hanging.py:{line_of('for _ in range(rounds)')}"
+    )
 
 
 @pytest.mark.long

@@ -13,7 +13,7 @@ CallJson = Callable[..., dict[str, Any]]
 
 def test_blocks_and_graphs(folder: Path, call: Call, call_json: CallJson) -> None:
     done = call("test", "blocks.ContactDetector")
-    assert "12 of 12 checks of 1 block passed" in done.stdout
+    assert "13 of 13 checks of 1 block passed" in done.stdout
     answer = call_json("test", "count.yaml", code=1)  # its block has undocumented ports
     problems = {(c["block"], c["check"]): c["problem"] for c in answer["checks"] if c["problem"]}
     assert problems["counter (Counter)", "documented"] == "Counter: port 'y' has no text"

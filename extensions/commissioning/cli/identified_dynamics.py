@@ -1,4 +1,4 @@
-"""What ``aloft robot identify`` shows and writes of a robot's dynamics by its logs."""
+"""Tables, JSON and YAML of ``aloft robot identify`` for a robot's dynamics by its logs."""
 
 from __future__ import annotations
 
@@ -113,22 +113,27 @@ def description_text(found: IdentifiedDynamics, files: list[Path]) -> str:
     """Return the values as a profile for the robot's YAML, and in comments the links' inertias for its URDF."""
     model = found.model
 
-    def listed(key: str, kind: str) -> Iterator[str]:
-        values = found.values(kind)
-        if values:
-            yield f"    {key}:"
-            for joint, each in values.items():
-                yield f"      {joint}: {each.value:.6f}  # +- {each.std:.2g}"
-
+    keys = {"friction": "coulomb", "damping": "viscous", "rotor_inertia": "rotor inertia"}
+    values = {key: found.values(kind) for key, kind in keys.items()}
     lines = [
         f"# {model.robot.name} as {', '.join(file.name for file in files)} show it, found by `aloft robot identify`.",
         "profiles:",
         "  identified:",
-        *listed("friction", "coulomb"),
-        *listed("damping", "viscous"),
-        *listed("rotor_inertia", "rotor inertia"),
-        "# The <inertial> of every link: the nearest bodies that can exist; of them only the base parameters are told.",
+        "    motors:",
     ]
+    for joint in model.joints:
+        lines.append(f"      {joint}:")
+        for key, each in values.items():
+            if joint in each:
+                lines.append(f"        {key}: {each[joint].value:.6f}  # +- {each[joint].std:.2g}")
+        if joint not in values["rotor_inertia"]:
+            own = float(model.rotors[model.joints.index(joint)])
+            lines.append(
+                f"        rotor_inertia: {own:.6f}  # as described: it acts with the link's"
+            )
+    lines.append(
+        "# The <inertial> of every link: the nearest bodies that can exist; of them only the base parameters are told."
+    )
     for name, link in found.body.links.items():
         com = " ".join(f"{each:.5f}" for each in link.com)
         parts = zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), link.inertia, strict=True)

@@ -59,11 +59,6 @@ STATUS_TEXTS = {
     Status.OUT_OF_RANGE: "a block got a number beyond the largest float, see last_block",
     Status.WRONG_LENGTH: "a block met a slice of another length than what it is combined with, see last_block",
 }
-_STATUS_OF = {
-    Failure.DIVISION: Status.DIVIDED_BY_ZERO, Failure.TOO_LARGE: Status.TOO_LARGE, Failure.DOMAIN: Status.OUT_OF_DOMAIN,
-    Failure.RANGE: Status.OUT_OF_RANGE, Failure.SLICE: Status.WRONG_LENGTH,
-}  # fmt: skip
-"""What a library says of a kernel that fails; one with functions of Numba is not exported."""
 MARK, CODE, BLOCK = 0, 8, 12
 """The bytes of an instance that hold the mark of the library, the last code and its block."""
 
@@ -304,15 +299,17 @@ class Module:
         """Write the label at which calls that fail go on."""
         if code.failures:
             code.label("failed")
-            blocks = ", ".join(f"[ {block}, %{label} ]" for block, _, label in code.failures)
-            statuses = ", ".join(f"[ {status}, %{label} ]" for _, status, label in code.failures)
-            code(f"%who = phi i32 {blocks}")
-            code(f"%what = phi i32 {statuses}")
+            for name, k in (("who", 0), ("what", 1)):
+                code(
+                    f"%{name} = phi i32 " + ", ".join(f"[ {e[k]}, %{e[2]} ]" for e in code.failures)
+                )
             code("%kind = and i32 %what, 15")
             told = str(int(Status.DIVIDED_BY_ZERO))
-            for failure, status in _STATUS_OF.items():
-                is_it = code.value(f"icmp eq i32 %kind, {int(failure)}")
-                told = code.value(f"select i1 {is_it}, i32 {int(status)}, i32 {told}")
+            for failure in Failure:  # one with functions of Numba is not exported
+                if failure.name in Status.__members__:
+                    is_it = code.value(f"icmp eq i32 %kind, {int(failure)}")
+                    status = int(Status[failure.name])
+                    told = code.value(f"select i1 {is_it}, i32 {status}, i32 {told}")
             code(f"store i32 {told}, ptr {code.at(CODE)}")
             code(f"store i32 %who, ptr {code.at(BLOCK)}")
             code(f"ret i32 {told}")

@@ -11,7 +11,7 @@ from aloft.hal.log.columns import mean_over, with_hysteresis
 from aloft.hal.log.log_file import LogError, read_log
 from aloft.hal.log.log_robot import LogRobot
 from aloft.hal.log.played_log import play
-from aloft.lab.studies import real_logs
+from aloft.lab.studies import icub_estimators
 from aloft.robots.description import find_robot
 
 from ...shared_data import needs_icub
@@ -238,8 +238,8 @@ WORST = {"walk": 0.025, "sway": 0.003}
 @pytest.mark.parametrize(("name", "log"), [("walk", "walking.mat"), ("sway", "com-sinusoid.mat")])
 def test_the_default_estimator_follows_a_real_robot_at_any_rate(tmp_path, rate, name, log):
     pytest.importorskip("h5py")
-    robot = real_logs.write_robot(tmp_path)
-    metrics = real_logs.metrics_of(robot, log, rate, "StateEstimator")
+    robot = icub_estimators.write_robot(tmp_path)
+    metrics = icub_estimators.metrics_of(robot, log, rate, "StateEstimator")
     assert metrics["estimator_position_rms_m"] < WORST[name]
     assert metrics["log_repeated_imu_share"] > 0.04
 
@@ -249,9 +249,9 @@ def test_the_default_estimator_follows_a_real_robot_at_any_rate(tmp_path, rate, 
 @pytest.mark.parametrize("begin", [6.1, 6.9, 8.0])
 def test_a_log_may_begin_in_a_step_of_a_real_robot(tmp_path, begin):
     pytest.importorskip("h5py")
-    robot = real_logs.write_robot(tmp_path)
+    robot = icub_estimators.write_robot(tmp_path)
     errors = {
-        kind: real_logs.metrics_of(robot, "walking.mat", 100, kind, begin)[
+        kind: icub_estimators.metrics_of(robot, "walking.mat", 100, kind, begin)[
             "estimator_position_rms_m"
         ]
         for kind in ("StateEstimator", "InvariantKalmanFilter")
@@ -272,3 +272,20 @@ def test_a_graph_is_written_from_a_file(saved):
     again = CliRunner().invoke(make_app(["log"]), ["log", "import", str(saved / "log.npz")])
     assert again.exit_code != 0
     assert "--force overwrites it" in again.output + again.stderr
+
+
+def test_a_log_is_played_once_for_a_check_and_its_run(saved, monkeypatch):
+    from aloft.hal.log import log_robot
+
+    calls = []
+
+    def counted(*given):
+        calls.append(given)
+        return play(*given)
+
+    monkeypatch.setattr(log_robot, "play", counted)
+    loaded = aloft.load(graph(saved, "log.npz"))
+    first = loaded.run()
+    assert len(calls) == 1
+    assert loaded.run().run_hash == first.run_hash
+    assert len(calls) == 2  # what a run took is its own

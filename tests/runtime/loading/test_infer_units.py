@@ -354,3 +354,23 @@ def test_a_rotation_mixes_elements(tmp_path: Path) -> None:
   r: {use: blocks.RotateVector, in: {rotation: q.y, u: [v.y, w.y, i.y]}}
 """
     assert "a rotation mixes its elements" in one(tmp_path, UNLIKE + blocks).message
+
+
+@pytest.mark.parametrize(
+    ("block", "said"),
+    [
+        ("Saturation, with: {upper: 5}", "upper is 5"),
+        ("Saturation, with: {upper: [5, 10]}", ""),
+        ("Saturation, with: {lower: 0}", ""),
+        ("UnitDelay", ""),
+        ("UnitDelay, with: {initial: 2}", "initial is 2"),
+        ("Integrator, with: {lower: -1}", "lower is -1"),
+        ("RateLimiter, with: {rising: [1, 2], falling: 3}", "falling is 3"),
+        ("Assertion, with: {upper: 9}", "upper is 9"),
+    ],
+)
+def test_one_number_for_unlike_units_is_questioned(tmp_path: Path, block: str, said: str) -> None:
+    text = f"rate: 100 Hz\nblocks:\n{UNLIKE}  x: {{use: blocks.{block}, in: {{u: m.y}}}}\n"
+    fix = "for all; give a list with one number for each element"
+    expected = (f"x.u joins [V, rad/s] in one vector: {said} {fix}",) if said else ()
+    assert checked_text(text, tmp_path / "graph.yaml").unchecked == expected

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pytest
 from tests.cli.conftest import run_for_json, run_here
-from tests.shared_data import FOLDER, needs_pendulum
+from tests.shared_data import needs_pendulum
 
-SLOW = ("143339", "143524", "143601", "143704")
+from aloft.lab.studies.pendulum_dynamics import HELD_OUT, SLOW, write_graphs
+from aloft.robots.description import find_robot
+
 PUBLISHED = {"Joint1": 0.201, "Joint2": 0.099}
 """What the published parameters leave of the swing-up's torques [N m]."""
 MOMENT, INERTIA = 0.15995, 0.05087
@@ -15,29 +17,19 @@ MOMENT, INERTIA = 0.15995, 0.05087
 
 @pytest.fixture
 def graphs(tmp_path):
-    data = FOLDER / "double_pendulum"
-    (tmp_path / "pendubot.urdf").write_text((data / "pendubot.urdf").read_text())
-    (tmp_path / "pendubot.yaml").write_text(
-        "file: pendubot.urdf\nname: pendubot\ntext: of a log\nbase_joint: fixed\n"
-        "profiles: {rated: {friction: 0.1, damping: 0.001, rotor_inertia: 0.00226}}\nsensors: {imu: false, switches: false}\n"
-    )
-    files = {}
-    for name in (*SLOW, "154220"):
-        files[name] = tmp_path / f"{name}.yaml"
-        files[name].write_text(
-            "rate: 500 Hz\nrobot: pendubot.yaml\nblocks:\n  robot:\n    use: hal.LogRobot\n    with:\n"
-            f"      file: {data / f'sysid_{name}.csv'}\n      clock: {{stamps: time}}\n"
-            "      joints:\n        names: [Joint1, Joint2]\n        position: [pos_meas1, pos_meas2]\n"
-            "        torque: [tau_meas1, tau_meas2]\n        commanded: [tau_con1, tau_con2]\n"
-        )
-    return files
+    return write_graphs(tmp_path)
 
 
 @needs_pendulum
 @pytest.mark.long
-def test_a_fit_of_slow_runs_explains_a_swing_up_as_well_as_the_published_parameters(graphs):
+def test_a_fit_of_slow_runs_explains_a_swing_up_as_well_as_the_published_parameters(
+    graphs, tmp_path
+):
     slow = [str(graphs[name]) for name in SLOW]
-    found = run_for_json("robot", "identify", *slow, "--held-out", str(graphs["154220"]))
+    out = tmp_path / "found.yaml"
+    found = run_for_json(
+        "robot", "identify", *slow, "--held-out", str(graphs[HELD_OUT]), "--out", str(out)
+    )
     judged = found["residuals"][-1]
     assert judged["held_out"]
     for joint, most in PUBLISHED.items():
@@ -48,6 +40,11 @@ def test_a_fit_of_slow_runs_explains_a_swing_up_as_well_as_the_published_paramet
     assert abs(inertia["value"] - INERTIA) < 2.0 * inertia["std"]
     for link in found["links"].values():
         assert link["mass"] > 0.0
+    profile = out.read_text()
+    own = tmp_path / "identified.yaml"
+    own.write_text("file: pendubot.urdf\nname: pendubot\nbase_joint: fixed\n" + profile)
+    friction = find_robot(str(own)).motors.friction
+    assert friction[1] == pytest.approx(found["values"]["coulomb"]["Joint2"]["value"], abs=1e-6)
 
 
 @needs_pendulum

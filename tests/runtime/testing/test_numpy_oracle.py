@@ -1,0 +1,134 @@
+"""A kernel is judged by the function as it is written, run by NumPy."""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from aloft import Block, Field, Input, Output, Signal, cross, kernel
+from aloft.mathematics.arrays import Array1D, Indices1D, Matrix3, Vector3
+from aloft.mathematics.kernel import expand
+from aloft.runtime.testing.conformance import ConformanceError, check_block
+from aloft.runtime.testing.numpy_oracle import NotJudged, difference
+
+
+class Three(Signal):
+    """Three numbers and one."""
+
+    v = Field(3, unit="1", text="three")
+    s = Field(unit="1", text="one")
+
+
+class Way(IntEnum):
+    THERE = 0
+    BACK = 1
+
+
+class Memory(NamedTuple):
+    x: Vector3
+    count: Indices1D
+
+
+@kernel
+def half(x: float, gain: float = 0.5) -> float:
+    return gain * x if x > 0.0 else x
+
+
+@kernel
+def everything(A: Matrix3, u: Vector3, memory: Memory, way: int, y: Array1D) -> None:
+    memory.x[:] = half(A @ u) + cross(u, A[0]) - math.sin(y[0]) * np.exp(-abs(u))
+    memory.count[0] += 3 if way == Way.BACK else 5
+    y[:] = min(max(memory.x, -1.0), 1.0)
+
+
+@kernel
+def cancels(u: Vector3, y: Vector3) -> None:
+    y[0] = np.sum(u) - u[0] - u[1] - u[2]
+
+
+@kernel
+def jumps(u: Vector3, y: Vector3) -> None:
+    y[0] = math.floor(u[0])
+
+
+def after(function: Any, *arguments: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """Arguments before a call, and after it."""
+
+    def one(each: Any) -> Any:
+        if isinstance(each, tuple):
+            return type(each)(*map(one, each))
+        return each.copy() if isinstance(each, np.ndarray) else each
+
+    found = tuple(map(one, arguments))
+    function(*found)
+    return arguments, found
+
+
+def test_a_right_kernel_is_numpys_and_any_other_number_is_not() -> None:
+    random = np.random.default_rng(0)
+    memory = Memory(np.zeros(3), np.array([7]))
+    given = random.normal(size=(3, 3)), random.normal(size=3), memory, 1, random.normal(size=3)
+    before, found = after(everything, *given)
+    assert not difference(everything, before, found)
+    found[2].x[1] *= 1.0 + 1e-11
+    assert "where NumPy has" in difference(everything, before, found)
+    before, found = after(everything, *given)
+    found[2].count[0] += 1
+    assert difference(everything, before, found) == "[11] where NumPy has [10]"
+
+
+def test_what_is_left_of_a_difference_is_rounding() -> None:
+    before, found = after(cancels, np.array([1e3, 0.1, 0.7]), np.zeros(3))
+    found[1][0] += 1e-13
+    assert not difference(cancels, before, found)
+    found[1][0] += 1e-9
+    assert difference(cancels, before, found)
+
+
+def test_a_number_at_a_threshold_is_judged_where_rounding_does_not_decide() -> None:
+    before, found = after(jumps, np.array([2.5, 0.0, 0.0]), np.zeros(3))
+    assert not difference(jumps, before, found)
+
+    @kernel
+    def refused(y: Vector3) -> None:
+        y[:] = 2.0 * y if y > 0.0 else y
+
+    with pytest.raises(NotJudged):
+        difference(refused, (np.zeros(3),), (np.zeros(3),))
+
+
+def block_of(kernel_function: Any) -> type[Block]:
+    class Judged(Block):
+        """A block."""
+
+        u = Input(Three, text="u")
+        y = Output(Three, text="y")
+        step = staticmethod(kernel_function)
+
+    return Judged
+
+
+@kernel
+def turned(u: Three, y: Three) -> None:
+    """What the block is to do."""
+    y.v[:] = u.v[::-1] * u.s
+    y.s = u.s + 1.0
+
+
+def not_turned(u: Three, y: Three) -> None:
+    for i in range(3):
+        y.v[i] = float(u.v[i]) * float(u.s[()])
+    y.s[()] = float(u.s[()]) + 1.0
+
+
+def test_a_block_is_checked_with_numpys_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    check_block(block_of(turned), cases=["kernels"])
+    expand(turned)
+    monkeypatch.setattr("aloft.runtime.testing.bench.compile_calls", lambda calls: "")
+    monkeypatch.setattr(turned, "__code__", not_turned.__code__)
+    with pytest.raises(ConformanceError, match=r"turned makes .* where NumPy has"):
+        check_block(block_of(turned), cases=["kernels"])
