@@ -1,8 +1,8 @@
 """Kernels drawn from the whole language, each judged by what nobody here wrote: NumPy, and Numba.
 
 The judge is the function as it is written, which NumPy runs, and ``numba.njit`` of the same source where that takes
-it. Plain Python with its loops, machine code and a sequence of calls must have the same bytes among each
-other; integers, flags and copies must be NumPy's, and numbers with a fraction as near as rounding allows: what is read
+it. Plain Python with its loops, machine code, that of an exported library and a sequence of calls must have the same
+bytes among each other; integers, flags and copies must be NumPy's, and numbers with a fraction as near as rounding allows: what is read
 are multiples of 1/8, so sums and products are exact, and what is left are divisions, roots and elementary functions.
 
 ::
@@ -13,6 +13,7 @@ are multiples of 1/8, so sums and products are exact, and what is left are divis
 from __future__ import annotations
 
 import argparse
+import ctypes
 import importlib.util
 import random
 import re
@@ -26,6 +27,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .kernel_grammar import HEAD, Drawn
+
+PORTABLE_EVERY = 10
+"""Every so many kernels are compiled as for an exported library, too."""
 
 
 class Tally(NamedTuple):
@@ -211,9 +215,35 @@ def judge(count: int, seed: int = 0, numba_every: int = 0, runs: int = 2) -> Tal
                             f"fused machine code is not that of one call: {one} {other}",
                         )
                         break
+                if k % PORTABLE_EVERY == 0:
+                    portable = copied(arguments)
+                    run_as_exported(getattr(module, name), portable)
+                    if any(
+                        one.tobytes() != other.tobytes()
+                        for one, other in zip(arrays_in(plain), arrays_in(portable), strict=True)
+                    ):
+                        wrong(module, name, "code for the oldest processor is not plain Python")
                 if numba_every and k % numba_every == 0:
                     ask_numba(module, name, plain, arguments, tally, wrong)
     return tally
+
+
+def run_as_exported(kernel: Any, arguments: list[Any]) -> None:
+    """Run a kernel compiled as exported libraries are: for the oldest processor of this computer's kind."""
+    from ..mathematics.compiling.arguments import pack, type_of
+    from ..mathematics.compiling.machine_code import (
+        OLDEST,
+        MachineCode,
+        cross_compiled,
+        process_triple,
+    )
+    from ..mathematics.compiling.translate import Translator
+
+    triple = process_triple()
+    text = Translator().module(kernel, tuple(map(type_of, arguments)))
+    words = pack(tuple(arguments))
+    code = MachineCode(cross_compiled(text, triple, OLDEST[triple]))
+    code.function(ctypes.c_size_t(words.ctypes.data))
 
 
 def ask_numba(

@@ -34,7 +34,7 @@ from .kernel_registry import is_kernel, written_code
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kinds
 from .slices import Cut, counters_of
 
-VERSION = 4
+VERSION = 5
 """Counts changes of what a statement is rewritten into: machine code made before is not used."""
 
 

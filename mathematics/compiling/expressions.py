@@ -190,7 +190,11 @@ class Expressions:
     def _kind_of_part(self, node: ast.Subscript) -> Kind:
         whole = self._kind(node.value)
         if not isinstance(whole, ArrayKind):
-            return None
+            constant = self._resolved(node.value)
+            numbers_only = isinstance(constant, tuple) and all(
+                isinstance(each, int | float) for each in constant
+            )
+            return NUMBER if numbers_only and not is_slice(node.slice) else None
         shape: list[int | None] = []
         indices = indices_of(node)
         if len(indices) > whole.rank:

@@ -1,4 +1,4 @@
-"""What ``aloft robot identify`` shows and writes of a robot's dynamics by its logs."""
+"""Tables, JSON and YAML of ``aloft robot identify`` for a robot's dynamics by its logs."""
 
 from __future__ import annotations
 

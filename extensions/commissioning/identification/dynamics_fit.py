@@ -82,7 +82,7 @@ class FormedLog:
 
 @dataclass(frozen=True)
 class FittedDynamics:
-    """What a fit found: the vector of all unknowns, its covariance, and the band [Hz].
+    """Result of a fit: the vector of all unknowns, its covariance, and the band [Hz].
 
     ``noise`` is that of every equation [N m], (n_velocities,); ``prior_std`` what was known beforehand.
     """

@@ -1,4 +1,4 @@
-"""What identification takes of a log, of whatever robot and by whomever: joints, torques, and the IMU of a free base."""
+"""Logs of motion and torque for identification, of whatever robot and by whomever: joints, torques, and the IMU of a free base."""
 
 from __future__ import annotations
 

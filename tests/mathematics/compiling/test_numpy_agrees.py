@@ -130,6 +130,7 @@ def test_statements_are_numpys() -> None:
 
 
 TABLE = np.array([1.0, 2.0, 3.0])
+LIMITS = (0.5, 1.5)
 
 
 @kernel
@@ -155,6 +156,8 @@ def functions(A: Matrix3, u: Vector3, w: Vector3, y: Vector3, r: Array1D) -> Non
         r[6] = x
     for row in A:
         r[7] += row[0] * row[-1]
+    filled = np.full(3, LIMITS[1])
+    r[:3] += np.minimum(filled, np.clip(filled[::-1], LIMITS[0], r[0]))
 
 
 @kernel
