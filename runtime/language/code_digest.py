@@ -72,3 +72,5 @@ def block_code(blocks: Iterable[BlockSpec]) -> Iterator[str]:
     specs = tuple(blocks)
     for spec in specs:
         for kind in spec.block_type.__mro__:
+            if _is_own(kind):
+                yield f"code of {spec.path}, {_name(kind)}: {_class_digest(kind)}"
