@@ -74,3 +74,70 @@ def block_code(blocks: Iterable[BlockSpec]) -> Iterator[str]:
         for kind in spec.block_type.__mro__:
             if _is_own(kind):
                 yield f"code of {spec.path}, {_name(kind)}: {_class_digest(kind)}"
+        for name in sorted(
+            {text for text in texts(spec.params.model_dump()) if CLASS.fullmatch(text)}
+        ):
+            module = sys.modules.get(name.partition(":")[0])
+            yield f"code of {spec.path}, {name}: {_module_digest(module, name)}"
+        for name in spec.block_type.program_files:
+            place = getattr(spec.params, name, None)
+            digest = program_digest(spec.folder / str(place)) if place else ""
+            yield f"code of {spec.path}, {place}: {digest[:16] or 'not found'}"
+    for folder in _SHARED:
+        yield f"code in aloft/{folder}: {_folder_digest(folder)}"
+
+
+def _is_own(kind: type) -> bool:
+    """Return whether a class is a block and not of the runtime, which is compared as a folder."""
+    return issubclass(kind, Block) and not kind.__module__.startswith(_RUNTIME)
+
+
+def _name(kind: type) -> str:
+    return f"{kind.__module__}:{kind.__qualname__}"
+
+
+def texts(value: Any) -> Iterator[str]:
+    """Yield every text in plain data, also the keys."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            yield from texts(key)
+            yield from texts(item)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            yield from texts(item)
+
+
+@cache
+def _class_digest(kind: type) -> str:
+    module = sys.modules.get(kind.__module__)
+    if module is None or getattr(module, "__file__", None) is None:
+        try:  # a class of a notebook, or of a program that was given as text
+            return sha256(inspect.getsource(kind).encode()).hexdigest()[:16]
+        except (OSError, TypeError):
+            return "no source"
+    return _module_digest(module, _name(kind))
+
+
+@cache
+def _module_digest(module: ModuleType | None, name: str) -> str:
+    file = Path(getattr(module, "__file__", None) or "")
+    try:
+        if _PACKAGE not in file.parents:
+            return module_digest(file, name)[:16]
+        folder = file.relative_to(_PACKAGE).parts[:2]
+        if folder[0] == "extensions":  # whose blocks share what lies beside them
+            return _folder_digest("/".join(folder))
+        return sha256(file.read_bytes()).hexdigest()[:16]
+    except OSError:
+        return "no source"
+
+
+@cache
+def _folder_digest(folder: str) -> str:
+    """Return the digest of all source files in a folder of this package."""
+    digest = blake2b(digest_size=8)
+    for path in sorted((_PACKAGE / folder).rglob("*.py")):
+        digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
