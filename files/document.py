@@ -324,6 +324,8 @@ class _Composer:
         while not isinstance(key_event := self.loader.get_event(), yaml.MappingEndEvent):
             key_where = self._where(key_event)
             written = isinstance(key_event, yaml.ScalarEvent)
+            # A key is always the text as it is written, also if that is `on`, `null` or `1`.
+            key: object = key_event.value if written else None
             # Most keys are nothing but texts, and need no node.
             if (
                 not written or key_event.anchor is not None or key_event.tag is not None
@@ -336,10 +338,10 @@ class _Composer:
                         Code.WRONG_KIND, "a key must be text, not a collection", key_where
                     )
                     continue
+                key = key if written else key_node.value
+            key = str(key)
             value, value_size = self._node(self.loader.get_event())
             size += value_size
-            # A key is always the text as it is written, also if that is `on`, `null` or `1`.
-            key = str(key_event.value if written else key_node.value)
             if not key.isascii():
                 key = key.translate(_SHOWN)
             if key == "<<" and written and key_event.implicit[0]:

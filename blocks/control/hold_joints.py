@@ -14,7 +14,7 @@ from ..signals import CommandMode, JointCommand, JointState
 
 
 class JointSetpoint(Signal):
-    """Where the joints should be now, how fast, and with which torque beside the feedback."""
+    """The wanted positions and speeds of the joints now, and the torque beside the feedback."""
 
     position = Field("n_joints", unit="rad", text="joint angles")
     velocity = Field("n_joints", unit="rad/s", text="joint velocities")
@@ -52,7 +52,7 @@ class HoldJoints(Block):
         damping = Field("n_joints", unit="N m s/rad", text="gain on velocities")
 
     class Begin(Signal):
-        """Where and when it began."""
+        """The pose and the time at which it began."""
 
         position = Field("n_joints", unit="rad", text="the joint angles then")
         tick = Field(dtype="int64", text="the tick")

@@ -87,7 +87,7 @@ class FaultDetector(Block):
       a thrust's 2.7 rad/s are 155, and within 4 ms the base would turn three times as fast.
     * In the stand, while joints are slow, the accelerometer differs by more than ``gross_gravity`` from 1 g away from the plane of the points that
       carry the robot. Neither the estimated attitude nor the switches are in it; the slope of the ground is, so it is a coarse check.
-    * In squat and thrust, while points stand and the legs' torques carry more than ``open_load``, the accelerometer reads less than ``gross_push`` of
+    * In squat and thrust, and after touchdown, while points stand and the legs' torques carry more than ``open_load``, the accelerometer reads less than ``gross_push`` of
       what they push, along the same normal. In healthy runs it read 0.56 to 1.5 times as much.
 
     The second must last for ``gross_time``, the others for ``lateness`` more. The sign of the accelerometer's x and y cannot be seen in an upright stand: turn the robot by hand
@@ -170,8 +170,17 @@ class FaultDetector(Block):
             find_gross_rate(judged, most, params.largest_rate, imu, state, constants, scratch)
             find_gross_gravity(imu, joints, terms, phase, state, params, constants, scratch)
             jumps = phase.phase == Phase.SQUAT or phase.phase == Phase.THRUST
+            landed = phase.phase == Phase.LANDING or phase.phase == Phase.RECOVER
             find_gross_push(
-                jumps and rigid, imu, load, terms, phase, state, params, constants, scratch
+                (jumps or landed) and rigid,
+                imu,
+                load,
+                terms,
+                phase,
+                state,
+                params,
+                constants,
+                scratch,
             )
             suspected = state.suspect != Suspect.NONE and state.suspect != Suspect.ENCODER
             if state.stop == Stop.NONE and jumps and suspected and params.suspects_end:

@@ -33,7 +33,7 @@ class Stop(IntEnum):
     GRAVITY = 2
     """At rest the accelerometer does not read gravity, away from the feet."""
     PUSH = 3
-    """In squat or thrust the accelerometer does not read what the legs push."""
+    """In squat, thrust or landing the accelerometer does not read what the legs push."""
     SUSPECT = 4
     """A suspect was found, and the robot was about to jump."""
 
@@ -93,7 +93,7 @@ class FaultDetectorParams(Parameters):
     )  # fmt: skip
     gross_push: float = parameter(
         0.3, ge=0.0, lt=1.0,
-        text="share of what the legs push that the accelerometer must read in squat and thrust, or the run ends; zero: any",
+        text="share of what the legs push that the accelerometer must read in squat, thrust and landing, or the run ends; zero: any",
     )  # fmt: skip
     suspects_end: bool = parameter(
         True,
@@ -131,7 +131,7 @@ class FaultDetectorState(Signal):
     gross = Field(
         5,
         dtype="int64",
-        text="ticks in a row with a gross error of gyroscope axes (large ones count three times), gravity and push",
+        text="ticks in a row with a gross error of gyroscope axes, gravity and push",
     )
     rested = Field(dtype="int64", text="ticks of rest so far")
     stop = Field(dtype="int64", values=Stop, text="why the run was ended")

@@ -85,15 +85,12 @@ def find_gross_rate(
     scratch: FaultDetectorScratch,
 ) -> None:
     """Count the ticks in which an axis of the gyroscope reads by more than ``most`` [rad/s] otherwise than the base turns
-    over its feet; those with three times as much count three times. A rate beyond the ``largest`` [rad/s] that
+    over its feet. A rate beyond the ``largest`` [rad/s] that
     any gyroscope reads ends the run at once, in every phase."""
     for axis in range(3):
         off = abs(imu.angular_velocity[axis] - scratch.turning[1, axis])
         gross = judged and most > 0.0 and not off <= most
-        heavy = (
-            3 if off > 3.0 * most else 1
-        )  # with so large an error nothing waits: the robot tips over in 40 ms
-        state.gross[axis] = state.gross[axis] + heavy if gross else 0
+        state.gross[axis] = state.gross[axis] + 1 if gross else 0
         if largest > 0.0 and not abs(imu.angular_velocity[axis]) <= largest:
             state.gross[axis] = constants.gross_ticks[0] + 1
         if state.gross[axis] > constants.gross_ticks[0]:
@@ -149,7 +146,7 @@ def find_gross_push(
     constants: FaultDetectorConstants,
     scratch: FaultDetectorScratch,
 ) -> None:
-    """Count the ticks of squat and thrust in which the accelerometer reads less than a share of what the legs push.
+    """Count the ticks of squat, thrust, landing and recovery in which the accelerometer reads less than a share of what the legs push.
 
     Feet only push, and what they push by the legs' torques is what a mass on them feels. Judged is where
     they carry more than ``open_load``.

@@ -20,11 +20,11 @@ from .linearisation import Linearisation
 ON_CIRCLE = 1e-6
 """A pole that is no farther outside of the unit circle than this is taken to lie on it: drift."""
 SIDES = (2e-3, 2e-2)
-"""How far beside a candidate its two sides are: first near, then farther, for one that was interpolated."""
+"""The distances of a candidate's two sides from it: first near, then farther, for one that was interpolated."""
 EXACT = 2e-5
 """The relative error of a limit that was interpolated."""
 _BESIDE = 1e-6
-"""How far beside 1 or -1 a transfer is computed that has a pole there."""
+"""The distance from 1 or -1 at which a transfer with a pole there is computed."""
 
 
 class ClosedLoop:

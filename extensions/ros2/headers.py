@@ -1,4 +1,4 @@
-"""What a message of ROS 2 says of its own numbers: their frame, whose they are, and which are there.
+"""The words of a ROS 2 message on its own numbers: their frame, whose they are, and which are there.
 
 A header names the frame of the numbers beside it, ``child_frame_id`` the frame that a transform or a
 velocity belongs to, and a covariance that begins with -1 says that a value is not there. A quaternion has

@@ -34,7 +34,7 @@ GAP = 5.0
 
 
 class PlayedRows(NamedTuple):
-    """What every tick plays, n rows: IMU (n, 6), joints (n, n_joints), switches (n, n_contacts), pose of the base
+    """Values that every tick plays, n rows: IMU (n, 6), joints (n, n_joints), switches (n, n_contacts), pose of the base
     (n, 7) with its quaternion x, y, z, w, and its twist (n, 6)."""
 
     imu: Array2D

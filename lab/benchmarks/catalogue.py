@@ -33,6 +33,8 @@ from .links.links import links
 from .loading import loading
 from .mutated_robots import mutated_robots
 from .planner.online_plans import online_plans
+from .planner.paper_plans import paper_plans
+from .planner.paper_solvers import paper_solvers
 from .planner.planner import planner
 from .recorder import recorder
 from .robot_files import robot_files
@@ -55,6 +57,8 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "falsification": falsification,
     "export": export,
     "planner": planner,
+    "paper_plans": paper_plans,
+    "paper_solvers": paper_solvers,
     "online_plans": online_plans,
     "recorder": recorder,
     "background": background,
@@ -80,13 +84,14 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
 }
 """All benchmarks by name; each returns its rows."""
 LONG = (
+    "paper_plans", "paper_solvers",
     "agreement", "speed", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
     "pushed_courses", "changed_targets", "hopping_on", "stones", "staircase", "go2_staircase", "every_robot",
     "mutated_robots", "robot_files",
 )  # fmt: skip
 """Names of the benchmarks that take minutes or hours and run only where they are named."""
 OPTIONS: Mapping[str, tuple[str, ...]] = {
-    "seconds": ("recorder", "background", "export"),
+    "seconds": ("recorder", "background", "export", "paper_solvers"),
     "count": ("agreement", "jumps", "export", "online_plans", "mutated_robots"),
     "seed": ("agreement", "jumps", "mutated_robots"),
     "seeds": (

@@ -34,6 +34,7 @@ from result_tables import (
     frontier_table,
     impulse_table,
     mutated_robots_table,
+    noted_table,
     quarter_table,
     ratio_table,
     real_table,
@@ -357,6 +358,17 @@ def write_solvers(file: Path) -> None:
     refresh(DOCS / "whole_body.md", "solvers", solver_table(read_json(file)))
 
 
+def write_paper_solvers(file: Path) -> None:
+    """Write the solvers on the paper's planning problem."""
+    refresh(DOCS / "planning.md", "paper solvers", noted_table(read_json(file), "start, solver"))
+
+
+def write_paper_plans(file: Path) -> None:
+    """Write what plans of the paper's problem ask of the motors."""
+    text = noted_table(read_json(file), "a jump of 12 cm in place")
+    refresh(DOCS / "planning.md", "paper plans", text)
+
+
 def write_twin(file: Path) -> None:
     """Write the twin beside the simulation; ``runs.parquet`` beside the summary says which seeds
     differ."""
@@ -416,6 +428,8 @@ PAGES = {
     "slopes": Page(write_slopes, f"{STUDIES}slopes.yaml", "results/slopes/summary.json"),
     "task_parameters": Page(write_task_parameters),
     "tasks": Page(write_tasks, f"{STUDIES}tasks.yaml", "results/tasks/summary.json"),
+    "paper_plans": Page(write_paper_plans, "aloft bench paper_plans --json > FILE", "FILE"),
+    "paper_solvers": Page(write_paper_solvers, "aloft bench paper_solvers --json > FILE", "FILE"),
     "solvers": Page(write_solvers, "aloft bench solvers --json > FILE", "FILE"),
     "tick": Page(write_tick, "aloft bench tick --tsid FOLDER --since COMMIT --json > FILE", "FILE"),
     "twin": Page(write_twin, f"{STUDIES}twin.yaml", "results/twin/summary.json"),

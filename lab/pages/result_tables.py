@@ -358,6 +358,18 @@ def solver_table(found: Row) -> str:
     return f"{_circumstances(found)}\n\n" + table(("tick", "us", "ratio", ""), cells)
 
 
+def noted_table(found: Row, head: str) -> str:
+    """Format a benchmark's rows: what it is, value, ratio to the first row of its kind, and the note."""
+    cells = []
+    for row in found["rows"]:
+        value = "-" if row["value"] is None else f"{row['value']:.3g} {row['unit']}"
+        ratio = "" if row["ratio"] is None else f"{row['ratio']:.3g}"
+        cells.append([row["name"], value, ratio, row["note"]])
+    if not any(ratio for _, _, ratio, _ in cells):
+        return table((head, "", ""), [[name, value, note] for name, value, _, note in cells])
+    return table((head, "", "ratio", ""), cells)
+
+
 def _circumstances(found: Row) -> str:
     machine, load = found["machine"], found["load"]
     return (

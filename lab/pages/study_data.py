@@ -27,6 +27,7 @@ DATA = "docs/data"
 PAGES: Mapping[str, tuple[str, ...]] = {
     "paper_controller": ("docs/comparisons.md",),
     "paper_factors": ("docs/comparisons.md",),
+    "paper_plans": ("docs/comparisons.md",),
     "paper_polar": ("docs/landing.md",),
     "paper_pushes": ("docs/landing.md",),
 }
@@ -40,6 +41,8 @@ CONTROLLER = (
     "robots/bruce",
 )
 """What the outcome of a jump depends on."""
+MORE: Mapping[str, tuple[str, ...]] = {"paper_plans": ("planner",)}
+"""What the outcome of a study depends on beside that."""
 STANDS_TILT = 5.0
 """deg, at rest; the paper's criterion in words is that the robot lands stably."""
 OUTCOMES = ("n", "successes", "stands")
@@ -74,7 +77,7 @@ def labels_of(folder: Path) -> list[str]:
     """Return the names of a study's axes that have more than one value."""
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     rows = summary["rows"]
-    known = ("task", "arm", "feet", "steps")
+    known = ("task", "jump", "arm", "feet", "steps")
     return [name for name in known if name in rows[0] and len({str(row[name]) for row in rows}) > 1]
 
 
@@ -198,7 +201,7 @@ def keep(root: Path, folders: Sequence[Path], commit: str) -> Path:
     data = {
         "study": f"graphs/studies/{name}.yaml",
         "commit": commit,
-        "measures": [*CONTROLLER, f"graphs/studies/{name}.yaml"],
+        "measures": [*CONTROLLER, *MORE.get(name, ()), f"graphs/studies/{name}.yaml"],
         "pages": list(PAGES[name]),
         "seeds": max((summary["seeds"] for summary in summaries), key=len),
         "labels": labels,

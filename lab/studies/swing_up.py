@@ -34,9 +34,9 @@ ABOUT_JOINT = (0.053470810264216295, 0.02392374528789766)
 ROTOR, FRICTION = 0.00276, 0.134
 """Rotors behind their gears [kg m^2]; friction of both joints [N m]."""
 COMPENSATED, DAMPING = np.array([0.09284, 0.07708]), np.array([0.01108, 0.0044])
-"""What the controller compensates: coulomb [N m] times arctan(100 v), and damping [N m s/rad]. The log's column of it is this."""
+"""Compensated friction: coulomb [N m] times arctan(100 v), and damping [N m s/rad]. The log's column of it is this."""
 CAUGHT = 4.407
-"""When the LQR takes over [s]: the log's torques are its from then on, to 1e-6."""
+"""Time at which the LQR takes over [s]: the log's torques are its from then on, to 1e-6."""
 CONTROLLER = "aloft.lab.studies.swing_up:Controller"
 SHARE, LIMIT, TOP = 0.2, 5.0, 8.0
 """The speeds' filter, the torque's limit [N m], and the time from which on the top is looked at [s]."""
@@ -136,7 +136,7 @@ def time_varying_gains(nominal: Any) -> tuple[Array, Array]:
 
 
 class Filtered(Signal):
-    """What the controller remembers."""
+    """Memory of the controller."""
 
     speed = Field("n_joints", unit="rad/s", text="speed behind the filter")
 

@@ -82,15 +82,18 @@ def _read(path: str) -> tuple[dict[str, Any], list[bytes]]:
         from rerun.experimental import RrdReader
     warnings.simplefilter("ignore")  # one that there is no index
     about: dict[str, Any] = {"format": None, "aloft": "", "chunks": 0}
-    records = []
+    records: list[bytes] = []
+    room = os.path.getsize(path) + (1 << 20)
     for chunk in RrdReader(path).stream():
         batch = chunk.to_record_batch()
         about["chunks"] += 1
         for name in batch.schema.names:
             if name == f"aloft:{RECORD}":
-                records += [
-                    value.values.to_numpy().tobytes() for value in batch[name] if value.is_valid
-                ]
+                values = [each.values.to_numpy().tobytes() for each in batch[name] if each.is_valid]
+                room -= sum(map(len, values))
+                if room < 0:  # records do not compress
+                    raise ValueError("its records are larger than the file")
+                records += values
         if str(chunk.entity_path) == "/__properties/aloft":
             for texts in _texts(batch):
                 about |= texts

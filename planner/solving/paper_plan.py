@@ -21,6 +21,8 @@ from .outcome import failure, motion_arrays, statistics_of, versions
 from .solver import solve
 from .solver_process import cpu_time
 
+STEPS = (0.0, 1.0 / 3.0, 2.0 / 3.0)
+"""Shares of the way, the turn and the height of a jump at which it is planned before it is planned itself."""
 LIMIT = 500
 """Iterations; without weights on accelerations the problem needs many."""
 WARM_BARRIER = 1e-3
@@ -52,7 +54,9 @@ def solve_paper(task: JumpTask, robot: RobotDescription, options: SolveOptions) 
 
     IPOPT is tried first: the equations have index three, as the
     centre of mass is tied to the joints by position, and fatrop more often ends early. From a ``warm_start``, a plan in
-    any formulation, IPOPT begins near it; where it finds nothing from there, it begins anew.
+    any formulation, IPOPT begins near it. A jump that leads elsewhere begins with the jump in place, from which it is
+    reached in steps: from nothing the solver ends in optima whose legs swing through half a turn. Where it finds nothing
+    from there, it begins anew.
     """
     started = cpu_time()
     if options.knots is not None:
@@ -62,16 +66,52 @@ def solve_paper(task: JumpTask, robot: RobotDescription, options: SolveOptions) 
     starts = [(name, problem.guess, False) for name in tries]
     if options.warm_start is not None and options.warm_start.touchdown_time > 0.0:
         starts.insert(0, (tries[0], variables_near(problem, options.warm_start), True))
+    else:
+        nearer = in_steps(task, robot, problem, tries[0], options)
+        if nearer is not None:
+            starts.insert(0, (tries[0], nearer, True))
     for name, guess, warm in starts:
         solution = solve(problem, guess, warm=warm, barrier=WARM_BARRIER, solver=name, limit=LIMIT)
         if solution.solved:
             break
     else:
         raise failure(task, solution)
-    statistics = statistics_of(problem, solution) | {"warm": warm}
+    statistics = statistics_of(problem, solution) | {
+        "warm": warm and options.warm_start is not None
+    }
     arrays = unpack(problem, solution.values, robot)
     statistics["cpu_s"] = cpu_time() - started
     return PlannedJump(task=task, statistics=statistics, versions=versions(), **arrays)
+
+
+def in_steps(
+    task: JumpTask,
+    robot: RobotDescription,
+    problem: SimpleProblem,
+    solver: str,
+    options: SolveOptions,
+) -> Array | None:
+    """Return variables near a jump's solution, from those of the jump in place and of jumps on the way to it; ``None`` for
+    jumps in place, for somersaults, and where one on the way has no solution."""
+    asked = {
+        name: getattr(task, name)
+        for name in ("distance_x", "distance_y", "twist", "landing_height")
+    }
+    if task.rotation or not any(asked.values()):
+        return None
+    values: Array | None = None
+    for share in STEPS:
+        way = task.model_copy(update={name: share * value for name, value in asked.items()})
+        near = paper_problem(way, robot, progress=options.progress)
+        guess = near.guess if values is None else np.clip(values, near.lower, near.upper)
+        found = solve(
+            near, guess, warm=values is not None, barrier=WARM_BARRIER, solver=solver, limit=LIMIT
+        )
+        if not found.solved:
+            return None
+        values = found.values
+    assert values is not None
+    return np.clip(values, problem.lower, problem.upper)
 
 
 def variables_near(problem: SimpleProblem, plan: PlannedJump) -> Array:

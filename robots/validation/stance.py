@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from ...files.problems import listing
 from ..robot_description import ContactPoint, Foot, Joint
 from .errors import Draft, Path, number, vector
 
@@ -33,6 +34,12 @@ def check_feet(draft: Draft) -> None:
                 "none", f"contacts: [{{name: {foot.name}_1, foot: {foot.name}, "
                 f"position: {vector(foot.sole)}, radius: 0.005}}]",
             )  # fmt: skip
+    if contacts and not feet:
+        owners = list(dict.fromkeys(contact.foot for _, contact in contacts))
+        draft.add(
+            ("contacts",), f"contact points belong to feet that are not there: {listing(owners)}",
+            "a foot for each in feet", "feet: none", "feet, or no contacts",
+        )  # fmt: skip
     for k, contact in contacts:
         path: Path = ("contacts", k)
         if contact.foot not in feet:

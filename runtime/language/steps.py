@@ -315,7 +315,8 @@ def as_record(signal: Signal, used: frozenset[str] | None = None) -> Any:
 
 def parameter_record(block: Block, used: Collection[str]) -> Any:
     """Arrays with the parameters that kernels name; a live change writes into them."""
-    kinds, arrays = parameter_kinds(type(block.params)), block.parameter_arrays
+    kinds = parameter_kinds(type(block.params))  # type: ignore[arg-type]  # a class is hashable; mypy asks its instances
+    arrays = block.parameter_arrays
     names = tuple(name for name in kinds if name in used)
     for name in names:
         if name not in arrays:  # else another call of the block reads it, too
@@ -338,6 +339,8 @@ def _parameter_array(params: Parameters, name: str, kind: Kind) -> NDArray[Any]:
 
 def refresh_parameters(block: Block) -> None:
     """Write a block's present parameters where its kernels read them."""
-    kinds = parameter_kinds(type(block.params)) if block.parameter_arrays else {}
+    if not block.parameter_arrays:
+        return
+    kinds = parameter_kinds(type(block.params))  # type: ignore[arg-type]  # a class is hashable; mypy asks its instances
     for name, array in block.parameter_arrays.items():
         array[...] = _parameter_array(block.params, name, kinds[name])

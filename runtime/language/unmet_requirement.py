@@ -1,4 +1,4 @@
-"""What a block reports of a parameter or a robot that it cannot work with."""
+"""The report of a block on a parameter or a robot that it cannot work with."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ _SHORTEST, _OFFSET = 1 << (FIRST_BITS - 1), 8 * FIRST_BITS + 7
 
 @dataclass(frozen=True)
 class TickLateness:
-    """How late the ticks of a run began.
+    """The lateness of the ticks of a run.
 
     Attributes:
         ticks: how many had a deadline; the first one, and the first after a pause, have none.

@@ -99,7 +99,7 @@ class SteppedRun:
 
     @property
     def stopped(self) -> bool:
-        """Whether a block has asked for the end, also in the last tick of the graph's duration."""
+        """True once a block has asked for the end, also in the last tick of the graph's duration."""
         return self._bound.clock.stop_reason is not None
 
     @property

@@ -1,4 +1,4 @@
-"""What ``aloft robot identify`` shows and writes of a robot's dynamics by its logs."""
+"""Tables, JSON and YAML of ``aloft robot identify`` for a robot's dynamics by its logs."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def read_log(file: Path, block: str | None, command: str) -> tuple[MotionLog, Ro
     run = read(file)
     if run.header.robot is None:
         raise AloftError(f"{file}: the graph {run.header.name} names no robot")
-    return log_of_recording(run, run.header.robot, block or "robot", command), run.header.robot
+    return log_of_recording(run, block or "robot", command), run.header.robot
 
 
 def dynamics_of(

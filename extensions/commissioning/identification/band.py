@@ -111,12 +111,7 @@ def _half(log: MotionLog, band: float, start: int) -> Motion:
 
     position = whole(log.position)
     velocity = slope(position)
-    rate = turning = force = None
-    if log.angular_velocity is not None and log.specific_force is not None:
-        rate, force = whole(log.angular_velocity), whole(log.specific_force)
-        turning = slope(rate)
-    states = (position, velocity, slope(velocity), rate, turning, force, log.closed)
-    return Motion(*(None if each is None else each[::step] for each in states))  # type: ignore[arg-type]
+    return Motion(position[::step], velocity[::step], slope(velocity)[::step])
 
 
 def torque_at(log: MotionLog, band: float) -> Array:

@@ -33,8 +33,7 @@ DEPENDENT = 1e-7
 @dataclass(frozen=True)
 class Motion:
     """States of a robot: ``position``, ``velocity``, ``acceleration`` of the joints (n, n_joints); of a floating base
-    ``rate`` [rad/s], ``turning`` [rad/s^2] and ``force``, the specific force [m/s^2], in its axes (n, 3); ``closed``
-    switches (n, n_contacts)."""
+    ``rate`` [rad/s], ``turning`` [rad/s^2] and ``force``, the specific force [m/s^2], in its axes (n, 3)."""
 
     position: Array
     velocity: Array
@@ -42,7 +41,6 @@ class Motion:
     rate: Array | None = None
     turning: Array | None = None
     force: Array | None = None
-    closed: Array | None = None
 
 
 class LinkRegressor:
@@ -61,7 +59,7 @@ class LinkRegressor:
 
         self._pin = pin
         built = build_pinocchio_model(robot)
-        self.robot, self.model, self.frames = robot, pin.Model(built.model), built.contact_frames
+        self.robot, self.model = robot, pin.Model(built.model)
         self.floating = robot.base_joint == "floating"
         self.first = 6 if self.floating else 0
         if self.floating:
@@ -123,7 +121,7 @@ class LinkRegressor:
         return np.asarray(self.lumped @ self.described)
 
     def rows(self, motion: Motion) -> Array:
-        """Return Y in the base parameters, (n, n_velocities, n_base); of standing feet's forces it is free."""
+        """Return Y in the base parameters, (n, n_velocities, n_base)."""
         return self._links_rows(motion, self._own)
 
     def _states(self, motion: Motion, k: int) -> tuple[Array, Array, Array]:
@@ -146,21 +144,3 @@ class LinkRegressor:
             made = pin.computeJointTorqueRegressor(model, data, *self._states(motion, k))
             rows[k] = made if columns is None else made[:, columns]
         return rows
-
-    def free_of_contacts(self, motion: Motion, sides: list[Array]) -> None:
-        """Project (n, n_velocities, ...) arrays, in place, onto what forces at closed contacts do not reach."""
-        if not self.floating or motion.closed is None:
-            return
-        pin, model, data = self._pin, self.model, self.data
-        world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        for k in range(len(motion.position)):
-            loaded = [f for f, on in zip(self.frames, motion.closed[k], strict=True) if on]
-            if not loaded:
-                continue
-            pin.computeJointJacobians(model, data, self._states(motion, k)[0])
-            pin.updateFramePlacements(model, data)
-            jacobian = np.vstack([pin.getFrameJacobian(model, data, f, world)[:3] for f in loaded])
-            _, sizes, directions = np.linalg.svd(jacobian, full_matrices=False)
-            used = directions[sizes > 1e-6 * sizes[0]]
-            for side in sides:
-                side[k] -= used.T @ (used @ side[k])

@@ -5,8 +5,7 @@ The torque that a log has of joint j is taken to be
     u_j(t) = (Y_j b + R_j a_j + C_j s(v_j) + B_j v_j + L_j s(v_j) |Y_j b + R_j a_j|) / k_j + o_j,  t by an age d late,
 
 with the base parameters b (``base_parameters``), rotors R, Coulomb friction C, viscous friction B, friction with load L,
-s(v) = tanh(v / v_0), a torque constant k relative to that with which the log was made, and an offset o. A floating base has six
-equations more, without a torque; forces of standing feet are projected out, and L acts on the measured torque.
+s(v) = tanh(v / v_0), a torque constant k relative to that with which the log was made, and an offset o. The base is fixed.
 
 Both sides are low-passed in the band that the motors drive (``band``). Unknowns are found by instrumental variables: equations by
 even samples, instruments by odd ones, and the other way round, so noise of the encoders biases nothing. Gauss and Newton's
@@ -77,12 +76,11 @@ class FormedLog:
     rows: tuple[Array, Array]
     passed: tuple[Array, Array]
     torque: Array
-    measured: Array
 
 
 @dataclass(frozen=True)
 class FittedDynamics:
-    """What a fit found: the vector of all unknowns, its covariance, and the band [Hz].
+    """Result of a fit: the vector of all unknowns, its covariance, and the band [Hz].
 
     ``noise`` is that of every equation [N m], (n_velocities,); ``prior_std`` what was known beforehand.
     """
@@ -141,12 +139,9 @@ class DynamicsModel:
                 f"{log.name} has {log.duration:.3g} s, and {(FEWEST + 9.0) / (3.0 * band):.2g} s are needed in "
                 f"a band of {band:.2g} Hz"
             )
-        measured = torque_at(log, band)
         torque = np.zeros((count, self.first + self.n))
-        torque[:, self.first :] = measured
+        torque[:, self.first :] = torque_at(log, band)
         rows = tuple(self.links.rows(motion) for motion in motions)
-        for motion, each in zip(motions, rows, strict=True):
-            self.links.free_of_contacts(motion, [each])
         return FormedLog(
             log,
             low,
@@ -154,7 +149,6 @@ class DynamicsModel:
             (rows[0], rows[1]),
             (low(rows[0]), low(rows[1])),
             low(torque),
-            measured,
         )
 
     def prior_std(self, logs: list[FormedLog]) -> Array:
@@ -195,15 +189,13 @@ class DynamicsModel:
         drive = rows @ value[part("base")]
         rotors = self.rotors.copy()
         rotors[self.links.told_rotors] = value[part("rotor inertia")]
-        turning = self._projected(motion, rotors * acceleration)
+        turning = self._padded(rotors * acceleration)
         drive = drive + turning
-        loaded = (
-            drive[:, first:] if not first else formed.measured * np.exp(value[part("log constant")])
-        )
+        loaded = drive[:, first:]
         load = sign * np.abs(loaded)
         friction = value[part("coulomb")] * sign + value[part("viscous")] * speed
         friction = friction + value[part("load")] * load
-        whole = drive + self._projected(motion, friction)
+        whole = drive + self._padded(friction)
         scale = np.ones(whole.shape[1])
         scale[first:] = np.exp(-value[part("log constant")])
         age = float(value[part("age of torques")][0])
@@ -211,9 +203,8 @@ class DynamicsModel:
         out = scale * (passed - age * late)
         jacobian = np.zeros((*out.shape, len(value)))
         jacobian[:, :, part("base")] = formed.passed[half]
-        if not first:
-            more = value[part("load")] * sign * np.sign(loaded)
-            jacobian[:, :, part("base")] += low(more[:, :, None] * rows)
+        more = value[part("load")] * sign * np.sign(loaded)
+        jacobian[:, first:, part("base")] += low(more[:, :, None] * rows[:, first:])
         told = self.links.told_rotors
         for kind, columns, own in (
             ("rotor inertia", acceleration, told), ("coulomb", sign, range(self.n)),
@@ -222,7 +213,7 @@ class DynamicsModel:
             for k, j in enumerate(own):
                 single = np.zeros_like(speed)
                 single[:, j] = columns[:, j]
-                jacobian[:, :, part(kind).start + k] = low(self._projected(motion, single))
+                jacobian[:, :, part(kind).start + k] = low(self._padded(single))
         jacobian *= scale[:, None]
         for j in range(self.n):
             jacobian[:, first + j, part("log constant").start + j] = -out[:, first + j]
@@ -231,11 +222,10 @@ class DynamicsModel:
         out[:, first:] += value[part("offset")]
         return out, jacobian
 
-    def _projected(self, motion: Motion, joints: Array) -> Array:
-        """Return torques of joints (n, n_joints) as rows of all velocities, free of the contacts' forces."""
+    def _padded(self, joints: Array) -> Array:
+        """Return torques of joints (n, n_joints) as rows of all velocities."""
         rows = np.zeros((len(joints), self.first + self.n))
         rows[:, self.first :] = joints
-        self.links.free_of_contacts(motion, [rows])
         return rows
 
 

@@ -1,4 +1,4 @@
-"""What a fit of a robot's dynamics is worth: what it leaves on every log, whether the motors agree, and what to beware of."""
+"""A judgement of a fit of a robot's dynamics: what it leaves on every log, whether the motors agree, and what to beware of."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What identification takes of a log, of whatever robot and by whomever: joints, torques, and the IMU of a free base."""
+"""Logs of motion and torque for identification, of whatever robot and by whomever: angles and torques of the joints."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....mathematics.arrays import Array
 from ....robots.robot_description import RobotDescription
@@ -28,8 +27,6 @@ class MotionLog:
         position: of the joints [rad or m], (n, n_joints).
         torque: measured at the joints [N m or N], (n, n_joints).
         asked: commanded torques without joint feedback [N m or N], (n, n_joints).
-        angular_velocity, specific_force: of a floating base, in its axes [rad/s, m/s^2], (n, 3).
-        closed: the foot switches, (n, n_contacts).
     """
 
     name: str
@@ -37,9 +34,6 @@ class MotionLog:
     position: Array
     torque: Array | None = None
     asked: Array | None = None
-    angular_velocity: Array | None = None
-    specific_force: Array | None = None
-    closed: NDArray[np.bool_] | None = None
 
     @property
     def duration(self) -> float:
@@ -48,7 +42,7 @@ class MotionLog:
 
 
 def log_of_recording(
-    run: RecordedRun, robot: RobotDescription, block: str = "robot", command: str = "safety.command"
+    run: RecordedRun, block: str = "robot", command: str = "safety.command"
 ) -> MotionLog:
     """Pick the signals of a recorded run. Only the joints' positions have to be there.
 
@@ -77,15 +71,8 @@ def log_of_recording(
         if values is not None and (values != 0.0).any():
             asked = None  # the drives add torques of their own
     torque = signal(f"{block}.joints.torque")
-    closed = signal(f"{block}.contacts.closed")
-    floating = robot.base_joint == "floating"
-    return MotionLog(
-        run.path.name, 1.0 / run.header.base_rate, position,
-        None if torque is None or not torque.any() else torque, asked,
-        signal(f"{block}.imu.angular_velocity") if floating else None,
-        signal(f"{block}.imu.specific_force") if floating else None,
-        None if closed is None or not floating else closed.astype(np.bool_),
-    )  # fmt: skip
+    measured = None if torque is None or not torque.any() else torque
+    return MotionLog(run.path.name, 1.0 / run.header.base_rate, position, measured, asked)
 
 
 def log_of_graph(file: Path, block: str | None = None) -> tuple[MotionLog, RobotDescription]:
@@ -120,14 +107,8 @@ def log_of_graph(file: Path, block: str | None = None) -> tuple[MotionLog, Robot
     rows = played.rows
     if params.joints is None or rows is None:
         raise AloftError(f"{file}: {params.file} names no joints, and nothing is told without")
-    floating = robot.base_joint == "floating"
-    imu = params.imu is not None and floating
-    return MotionLog(
-        Path(params.file).name, period, rows.position,
-        None if params.joints.torque is None else rows.torque, played.commanded,
-        rows.imu[:, :3] if imu else None, rows.imu[:, 3:] if imu else None,
-        rows.closed if params.contacts and floating else None,
-    ), robot  # fmt: skip
+    torque = None if params.joints.torque is None else rows.torque
+    return MotionLog(Path(params.file).name, period, rows.position, torque, played.commanded), robot
 
 
 def missing(log: MotionLog, robot: RobotDescription) -> list[str]:
@@ -143,19 +124,11 @@ def missing(log: MotionLog, robot: RobotDescription) -> list[str]:
             "delay cannot be told: motion alone determines none of them. Log the measured torques, or the motors' "
             "currents times their torque constants (joints.torque)"
         )
-    if robot.base_joint == "floating":
-        if log.specific_force is None or log.angular_velocity is None:
-            raise IdentificationError(
-                f"{log.name} has no IMU, so the motion of {robot.name}'s floating base is unknown and no inertia can be "
-                "told: give the log's imu, or fix the base"
-            )
-        if log.closed is None:
-            raise IdentificationError(
-                f"{log.name} has no contacts, so forces of the ground cannot be told from inertia: give contacts"
-            )
-    elif robot.base_joint != "fixed":
+    if robot.base_joint != "fixed":
         raise IdentificationError(
-            f"{robot.name} has a {robot.base_joint} base: none of that is fitted"
+            f"{robot.name} has a {robot.base_joint} base, and inertias are told from logs of fixed ones: forces of the ground hide them. "
+            "One recording with an estimator and contacts tells mass, torso's CoM, friction and delay; or hang the robot up, and write "
+            "base_joint: fixed"
         )
     if log.asked is None:
         untold.append("delay: the log has no commanded torques without joint feedback")

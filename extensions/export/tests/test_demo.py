@@ -137,3 +137,9 @@ def test_a_block_in_plain_python_is_refused(world: ModuleType, tmp_path: Path) -
     )
     with pytest.raises(NeedsPython, match=r"noisy.yaml: block 'hiss' .*plain Python"):
         world.make_world(graph, [], "noisy")
+
+
+@pytest.mark.long
+def test_a_robot_that_calls_python_in_its_steps_is_refused(world: ModuleType) -> None:
+    with pytest.raises(NeedsPython, match="block 'robot' calls Python in a step of its simulator"):
+        world.make_world(DEMO / "push.yaml", ["robot.ground.contact_bias=true"], "push")

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from ....mathematics.arrays import Array
-from ....planner.problem.assembly import Assembly
-from ....planner.problem.problem import FullProblem
+from ....planner.problem.assembly import Assembly, NonlinearProgram
 from ....planner.solving.solver import violation_of
 
 OPTIONS: dict[str, float | int] = {
@@ -117,7 +116,7 @@ class SnoptProgram:
     Raises ``ImportError`` where Drake is not installed.
     """
 
-    def __init__(self, problem: FullProblem) -> None:
+    def __init__(self, problem: NonlinearProgram) -> None:
         from pydrake.solvers import MathematicalProgram
 
         self.is_out_of_time = False

@@ -100,7 +100,8 @@ class Widths:
 
     def _width(self, flat: FlatBlock, block_type: type[Block], name: str) -> int | None:
         """Return a width, ``None`` while nothing says it."""
-        for key in _lists_of(block_type) if name == "n" else ():
+        lists = _lists_of(block_type) if name == "n" else ()  # type: ignore[arg-type]  # a class is hashable; mypy asks its instances
+        for key in lists:
             entry = flat.parameters.get(key)
             value = entry.value if entry is not None else None
             if isinstance(value, ListNode) and value.items:
@@ -163,7 +164,8 @@ class Widths:
 
 def open_widths(flat: FlatBlock, block_type: type[Block]) -> Iterator[str]:
     """Return the parameters that are sizes of a block's inputs and that the graph does not give."""
-    return (name for name in _widths_of(block_type) if flat.parameters.get(name) is None)
+    widths = _widths_of(block_type)  # type: ignore[arg-type]  # a class is hashable; mypy asks its instances
+    return (name for name in widths if flat.parameters.get(name) is None)
 
 
 @lru_cache(maxsize=1024)

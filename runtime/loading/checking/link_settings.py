@@ -67,13 +67,13 @@ def read_link_settings(graph: FlatGraph, clock: str, problems: Problems) -> Link
     lease, patience = given.get("lease", LEASE), given.get("patience", PATIENCE)
     if lease < LEAST_LEASE or patience < lease:
         key, least = ("lease", LEAST_LEASE) if lease < LEAST_LEASE else ("patience", lease)
-        entry = graph.links.get(key) or graph.links.get("lease")
+        written = graph.links.get(key) or graph.links.get("lease")
         problems.add(
             Code.MACHINE,
             "a machine would be taken for gone between two signs of life"
             if key == "lease"
             else "a part would stop waiting for a machine before that is taken for gone",
-            graph.links.where if entry is None else entry.value.where,
+            graph.links.where if written is None else written.value.where,
             at=f"links.{key}",
             expected=f"at least {least:g} s",
             found=f"{given.get(key, patience):g} s",

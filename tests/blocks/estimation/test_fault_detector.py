@@ -287,9 +287,7 @@ def test_a_gyroscope_that_turns_otherwise_than_the_base_ends_the_run(axis, facto
     assert ended_by(standing, 6) == (6, "")
     standing.bench.set("imu", angular_velocity=factor * rate)
     ticks, reason = ended_by(standing)
-    assert ticks == (4 if factor < 0 else 1), (
-        "lateness and gross_time are borne, of a large error less"
-    )
+    assert ticks == 4, "lateness and gross_time are borne"
     assert reason.startswith(f"{standing.bench.block.context.path}: the gyroscope's axis")
     assert looks in reason
 
@@ -311,15 +309,13 @@ def test_gross_errors_are_not_judged_where_their_limit_is_zero():
     assert ended_by(standing) == (50, "")
 
 
-@pytest.mark.parametrize("phase", [Phase.SQUAT, Phase.THRUST])
+@pytest.mark.parametrize("phase", [Phase.SQUAT, Phase.THRUST, Phase.LANDING, Phase.RECOVER])
 @pytest.mark.parametrize(
     ("factor", "looks"),
     [(0.102, "it looks like g in place of m/s^2"), (-1.0, "its sign looks wrong")],
 )
 @pytest.mark.parametrize("name", ["bruce", "go2"])
-def test_an_accelerometer_that_goes_wrong_in_squat_or_thrust_ends_the_run(
-    name, phase, factor, looks
-):
+def test_an_accelerometer_that_goes_wrong_under_load_ends_the_run(name, phase, factor, looks):
     standing = Standing(name)
     standing.bench.set("phase", phase=phase)
     assert ended_by(standing) == (50, "")
@@ -379,10 +375,3 @@ def test_a_rate_that_no_gyroscope_reads_ends_the_run_at_once(phase):
     standing.bench.set("phase", phase=phase)
     standing.bench.set("imu", angular_velocity=[0.0, 155.6, 0.0])
     assert standing.state.stop == Stop.NONE
-
-
-def test_a_large_error_of_the_gyroscope_counts_three_times():
-    for rate, ticks in ((1.0, 4), (1.5, 1)):  # gross_rate is 0.4 rad/s
-        standing = Standing()
-        standing.bench.set("imu", angular_velocity=[0.0, rate, 0.0])
-        assert ended_by(standing)[0] == ticks

@@ -272,3 +272,20 @@ def test_a_graph_is_written_from_a_file(saved):
     again = CliRunner().invoke(make_app(["log"]), ["log", "import", str(saved / "log.npz")])
     assert again.exit_code != 0
     assert "--force overwrites it" in again.output + again.stderr
+
+
+def test_a_log_is_played_once_for_a_check_and_its_run(saved, monkeypatch):
+    from aloft.hal.log import log_robot
+
+    calls = []
+
+    def counted(*given):
+        calls.append(given)
+        return play(*given)
+
+    monkeypatch.setattr(log_robot, "play", counted)
+    loaded = aloft.load(graph(saved, "log.npz"))
+    first = loaded.run()
+    assert len(calls) == 1
+    assert loaded.run().run_hash == first.run_hash
+    assert len(calls) == 2  # what a run took is its own

@@ -16,7 +16,7 @@ from aloft.logs.file.header import header_of
 from aloft.logs.file.reader import scan
 from aloft.logs.file.records import MARK, Content, Record, composed, packed_text, records_in
 from aloft.logs.recording.output_file import reserve_output
-from aloft.logs.recording.record_stream import RecordStream, RerunPipe
+from aloft.logs.recording.record_stream import RecordStream, RerunPipe, as_arrow
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
@@ -127,6 +127,19 @@ def test_a_file_of_an_older_format_names_the_version_that_reads_it(tmp_path: Pat
     match = f"old.rrd has format 6, this version of aloft reads {FORMAT}; read it with aloft 0.9.1"
     with pytest.raises(RecordingError, match=match):
         read(tmp_path / "old.rrd")
+
+
+def test_what_unpacks_to_more_than_the_file_is_refused(tmp_path: Path) -> None:
+    import rerun as rr
+
+    stream = rr.RecordingStream("aloft", send_properties=False)
+    stream.save(tmp_path / "a.rrd")
+    column = rr.DynamicArchetype.columns("aloft", components={"record": as_arrow(bytes(3 << 20))})
+    stream.send_columns("rows", [], list(column.partition([3 << 20])))
+    stream.disconnect()
+    assert (tmp_path / "a.rrd").stat().st_size < 100_000
+    with pytest.raises(RecordingError, match="its records are larger than the file"):
+        read(tmp_path / "a.rrd")
 
 
 def test_a_file_without_an_index_is_whole(header: Header, tmp_path: Path) -> None:

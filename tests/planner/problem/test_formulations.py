@@ -11,10 +11,13 @@ import pytest
 
 from aloft.planner.checking.validity import broken_array, check_plan
 from aloft.planner.models.exact_dynamics import ExactDynamics
+from aloft.planner.problem.program import SimpleProblem
+from aloft.planner.solving import paper_plan
+from aloft.planner.solving.paper_plan import paper_problem
 from aloft.planner.solving.solve import FORMULATIONS, solve_jump
 from aloft.planner.task.files import PlanError
 from aloft.planner.task.plan import ARRAYS, PlannedJump
-from aloft.planner.task.task import make_task
+from aloft.planner.task.task import JumpTask, make_task
 from aloft.robots.description import find_robot
 
 from .own_equations import (
@@ -211,6 +214,26 @@ def test_the_papers_problem_takes_its_contact_sequence_from_the_task() -> None:
     flat = solve_jump(make_task(values | {"knots": {**COARSE, "thrust": 9, "flight": 11}}), ROBOT)
     fastest = [np.abs(p.velocity[knot(p, p.lift_off_time), 6:]).max() for p in (plan, flat)]
     assert fastest[0] < 0.8 * fastest[1]
+
+
+@pytest.mark.long
+def test_a_jump_elsewhere_begins_with_the_jump_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways = []
+
+    def noted(task: JumpTask, *given: Any, **more: Any) -> SimpleProblem:
+        ways.append((task.distance_x, task.twist))
+        return paper_problem(task, *given, **more)
+
+    monkeypatch.setattr(paper_plan, "paper_problem", noted)
+    values = {"recipe": "paper", "formulation": "paper", "rise": 0.1, "knots": COARSE}
+    plan = solve_jump(make_task({**values, "name": "ahead", "distance_x": 0.06}), ROBOT)
+    # The problem itself is made first, and then those on the way.
+    assert ways == [(0.06, 0.0), (0.0, 0.0), pytest.approx((0.02, 0.0)), pytest.approx((0.04, 0.0))]
+    assert not plan.statistics["warm"], "nobody gave a plan to start from"
+    assert plan.com[-1, 0] - plan.com[0, 0] == pytest.approx(0.06, abs=1e-6)
+    ways.clear()
+    solve_jump(make_task({**values, "name": "in place"}), ROBOT)
+    assert ways == [(0.0, 0.0)]
 
 
 @pytest.mark.parametrize("formulation", ["paper", "srbm"])

@@ -36,6 +36,15 @@ WRONG_STANCES: list[tuple[list[Change], list[str]]] = [
         ],
     ),
     (
+        [(("feet",), [])],
+        [
+            "hopper.yaml:56:1: contact points belong to feet that are not there: foot",
+            "    expected   a foot for each in feet",
+            "    found      feet: none",
+            "    fix        feet, or no contacts",
+        ],
+    ),
+    (
         [(("contacts", 0, "radius"), -0.1)],
         [
             "hopper.yaml:68:11: contact toe has a radius of -0.1 m",
