@@ -33,7 +33,7 @@ PORTABLE_EVERY = 10
 
 
 class Tally(NamedTuple):
-    """What came of some kernels: how many were taken, refused, not NumPy's either, judged by Numba; and what was wrong."""
+    """A count of what came of some kernels: how many were taken, refused, not NumPy's either, judged by Numba; and what was wrong."""
 
     counts: Counter[str]
     wrong: list[str]

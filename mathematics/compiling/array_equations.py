@@ -12,7 +12,7 @@ from .slices import Cut, Slices, called, minus, plus
 
 
 class ArraySelection(NamedTuple):
-    """Which part of which array an expression is: for each dimension a number or a slice."""
+    """A part of an array that an expression is: for each dimension a number or a slice."""
 
     array: str
     indices: tuple[tuple[str, ...], ...]

@@ -67,7 +67,7 @@ _TEXTS = {
     "any": ("total = False", "if E: total = True"),
     "all": ("total = True", "if not E: total = False"),
 }
-"""What stands before the loop over all elements E of an array, and in it; the result is ``total``."""
+"""The statements before the loop over all elements E of an array, and in it; the result is ``total``."""
 
 
 class ArrayFunctions(ArrayEquations):

@@ -32,7 +32,7 @@ FAILURES: dict[Failure, tuple[type[Exception], str]] = {
 
 
 class Site(NamedTuple):
-    """Where a function can fail, and why."""
+    """A line at which a function can fail, and why."""
 
     failure: Failure
     line: int

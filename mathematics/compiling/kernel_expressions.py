@@ -85,7 +85,7 @@ class ExpressionTranslator:
         self._types = types
         self._signed = signed
         self._bits = bits
-        """How many bits the variables of loops may have."""
+        """The number of bits that the variables of loops may have."""
         self._code = FunctionCode(origin_of(function))
         self._rooms: dict[str, tuple[str, ...]] = {}
         self._callees: dict[str, Translated] = {}

@@ -27,7 +27,7 @@ class Translator:
         self._translated: dict[tuple[int, tuple[ArgumentType, ...]], Translated] = {}
         self._definitions: dict[int, Any] = {}
         self._open: set[tuple[int, tuple[ArgumentType, ...]]] = set()
-        """What is being translated at present."""
+        """The functions that are being translated at present."""
 
     def object_code(self, kernel: Callable[..., Any], signature: tuple[ArgumentType, ...]) -> bytes:
         """Return the object file of ``kernel`` for arguments of these types.

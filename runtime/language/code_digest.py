@@ -72,9 +72,8 @@ def block_code(blocks: Iterable[BlockSpec]) -> Iterator[str]:
     specs = tuple(blocks)
     for spec in specs:
         for kind in spec.block_type.__mro__:
-            if issubclass(kind, Block) and not kind.__module__.startswith(_RUNTIME):
-                digest = _class_digest(kind)  # type: ignore[arg-type]  # a class is hashable; mypy asks its instances
-                yield f"code of {spec.path}, {_name(kind)}: {digest}"
+            if _is_own(kind):
+                yield f"code of {spec.path}, {_name(kind)}: {_class_digest(kind)}"
         for name in sorted(
             {text for text in texts(spec.params.model_dump()) if CLASS.fullmatch(text)}
         ):
@@ -86,6 +85,11 @@ def block_code(blocks: Iterable[BlockSpec]) -> Iterator[str]:
             yield f"code of {spec.path}, {place}: {digest[:16] or 'not found'}"
     for folder in _SHARED:
         yield f"code in aloft/{folder}: {_folder_digest(folder)}"
+
+
+def _is_own(kind: type) -> bool:
+    """Return whether a class is a block and not of the runtime, which is compared as a folder."""
+    return issubclass(kind, Block) and not kind.__module__.startswith(_RUNTIME)
 
 
 def _name(kind: type) -> str:

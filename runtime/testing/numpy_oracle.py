@@ -1,4 +1,4 @@
-"""What NumPy makes of a kernel as it is written: the judge of kernels, whose equations become loops.
+"""Judges kernels by NumPy, which runs them as they are written: their equations become loops elsewhere.
 
 The untouched function runs on copies of the arguments, with signals whose scalar fields are numbers, and functions of
 numbers that take whole arrays. What NumPy does not take is not judged.
