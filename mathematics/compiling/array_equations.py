@@ -155,8 +155,10 @@ class ArrayEquations(Slices):
         return self._children(node, lambda each: self._settle(each, target))
 
     def _kept_sum(self, node: ast.BinOp) -> ast.expr:
-        self._demand_product(node, [])
-        made = self._sum(node, [])
+        product = self._without_cross(node)
+        assert isinstance(product, ast.BinOp)
+        self._demand_product(product, [])
+        made = self._sum(product, [])
         assert isinstance(made, ast.Name)
         self._kinds[made.id] = NUMBER
         return made

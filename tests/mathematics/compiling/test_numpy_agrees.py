@@ -143,6 +143,7 @@ def functions(A: Matrix3, u: Vector3, w: Vector3, y: Vector3, r: Array1D) -> Non
     """What people write: functions of arrays, arrays of the kernel's own, names of arguments."""
     y[:] = np.clip(u, -1.0, 1.0) + np.where(w > 0.0, w, TABLE) * np.minimum(u, w)
     y[:] += np.cross(u, np.dot(A, w)) / np.linalg.norm(u) + np.outer(u, w)[1] + np.sin(w)
+    y[:] += w - np.dot(np.cross(u, A[:, 1]), np.cross(u, A[:, 1]))
     t = np.zeros(3)
     for i, (a, b) in enumerate(zip(u, w, strict=True)):
         t[i] = a - b
