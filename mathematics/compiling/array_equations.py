@@ -163,6 +163,10 @@ class ArrayEquations(Slices):
         self._kinds[made.id] = NUMBER
         return made
 
+    def _without_cross(self, value: ast.expr) -> ast.expr:
+        """Compute the cross products in a value ahead."""
+        raise NotImplementedError
+
     def _element_statement(
         self, target: ast.expr, value: ast.expr, places: list[ast.expr]
     ) -> ast.stmt:
