@@ -59,7 +59,12 @@ PROGRAM
 pip="$folder/bin/python -m pip install -qq --disable-pip-version-check"
 editable="$pip --no-deps --no-build-isolation --editable ."
 # one after the other: setuptools writes what it knows of a checkout into the checkout
-if ! timeout "$limit" $pip -r "$folder/wanted.txt" || ! { flock 9 || true; $editable; } 9>build/lock; then
+if ! timeout "$limit" $pip -r "$folder/wanted.txt" 2>"$folder/pip.log" || ! { flock 9 || true; $editable; } 9>build/lock; then
+    cat "$folder/pip.log" >&2
+    if grep -q ResolutionImpossible "$folder/pip.log"; then
+        echo "versions that pyproject.toml allows exclude each other: raise a lower bound"
+        exit 1
+    fi
     echo "the packages could not be installed within $limit s: nothing is tested with $which on $python"
     exit 0
 fi

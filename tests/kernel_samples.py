@@ -11,6 +11,7 @@ from aloft.blocks.scoring.footing import Footing
 from aloft.blocks.scoring.jump_criteria import JumpRecord, JumpSeries
 from aloft.blocks.signals import PhaseState, RobotTruth, WholeBodyCommand
 from aloft.hal.simulated import external_forces
+from aloft.hal.simulated.physics_step import JointResistance
 from aloft.mathematics import elementwise
 from aloft.mathematics.body_dynamics import BodyMotion, body_motion, composite_inertias
 from aloft.mathematics.compiling import numpy_numbers
@@ -489,7 +490,8 @@ UNUSED |= {
 }
 UNUSED["aloft.blocks.scoring.estimator_score.heading"] = (np.array([0.1, 0.2, 0.3, 0.92]),)
 UNUSED["aloft.hal.simulated.physics_step.begin_flight_step"] = (
-    np.zeros(1), np.zeros(1, np.int64), np.ones(1, np.int64),
+    np.zeros(1), JointResistance(np.array([0.1, 0.2]), np.array([0.3, 0.4])),
+    JointResistance(np.zeros(2), np.zeros(2)), np.zeros(1, np.int64), np.ones(1, np.int64),
 )  # fmt: skip
 UNUSED |= {
     f"{each.__module__}.{each.__name__}": tuple(

@@ -45,6 +45,11 @@ def test_every_page_stands_once_in_one_of_four_parts() -> None:
     entries = [line for text in parts.values() for line in text.split("\n") if line]
     named = [re.sub(r".*<(.*)>", r"\1", entry) for entry in entries]
     found = [(DOCS / f"{name}.md").resolve() for name in named]
+    families = re.search(
+        r"```\{toctree\}\n:hidden:\n\n(.*?)```", (DOCS / "blocks/index.md").read_text(), re.DOTALL
+    )
+    assert families is not None
+    found += [DOCS / "blocks" / f"{name}.md" for name in families[1].split()]
     assert sorted(found) == sorted(page for page in PAGES if page != DOCS / "index.md")
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -231,6 +232,16 @@ def paired(name: str, found: Sequence[Sequence[float]], unit: str, since: str) -
     )  # fmt: skip
 
 
+_WITNESS = """
+import json, os, sys
+pid = os.posix_spawn(sys.executable, [sys.executable, *sys.argv[2:]], os.environ)
+_, status, used = os.wait4(pid, 0)
+with open(sys.argv[1], "w") as file:
+    json.dump([os.waitstatus_to_exitcode(status), used.ru_utime + used.ru_stime, used.ru_maxrss], file)
+"""
+"""Starts the process that is measured: Linux counts the memory of whoever starts a process as its peak, so that must be small."""
+
+
 def run_process(
     arguments: Sequence[str], build: Build, codes: Sequence[int] = (0,), forgets: Sequence[str] = ()
 ) -> dict[str, float]:
@@ -242,28 +253,31 @@ def run_process(
     cache = build.folder / "cache"
     for name in forgets:
         shutil.rmtree(cache / "aloft" / name, ignore_errors=True)
-    with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as errors:
+    with (
+        tempfile.TemporaryFile() as output,
+        tempfile.TemporaryFile() as errors,
+        tempfile.NamedTemporaryFile() as usage,
+    ):
         process = subprocess.Popen(
-            [sys.executable, *arguments], cwd=build.folder, stdout=output, stderr=errors,
-            env=build.environment(XDG_CACHE_HOME=str(cache)),
+            [sys.executable, "-I", "-S", "-c", _WITNESS, usage.name, *arguments], cwd=build.folder,
+            stdout=output, stderr=errors, env=build.environment(XDG_CACHE_HOME=str(cache)),
+            start_new_session=True,
         )  # fmt: skip
-        end = time.monotonic() + TIMEOUT
-        while not (done := os.wait4(process.pid, os.WNOHANG))[0]:
-            if time.monotonic() > end:
-                process.kill()
-                os.wait4(process.pid, 0)
-                raise AssertionError(f"{' '.join(arguments)[:80]} did not end in {TIMEOUT:.0f} s")
-            time.sleep(0.002)
-        process.returncode = os.waitstatus_to_exitcode(done[1])
-        output.seek(0)
-        errors.seek(0)
+        try:
+            process.wait(TIMEOUT)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+            raise AssertionError(
+                f"{' '.join(arguments)[:80]} did not end in {TIMEOUT:.0f} s"
+            ) from None
+        for file in (output, errors):
+            file.seek(0)
         text, problem = output.read().decode(), errors.read().decode(errors="replace")
-    if process.returncode not in codes:
-        raise AssertionError(
-            f"{' '.join(arguments)[:80]} ended with {process.returncode}: {problem[-500:]}"
-        )
-    used = done[2]
-    figures = {"time": used.ru_utime + used.ru_stime, "memory": used.ru_maxrss / 1024.0}
+        code, seconds, kilobytes = json.loads(usage.read())
+    if code not in codes:
+        raise AssertionError(f"{' '.join(arguments)[:80]} ended with {code}: {problem[-500:]}")
+    figures = {"time": seconds, "memory": kilobytes / 1024.0}
     try:
         printed = json.loads(text.strip().splitlines()[-1])
     except (IndexError, ValueError):

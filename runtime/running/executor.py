@@ -16,7 +16,7 @@ from typing import Any
 
 from ...mathematics.compiling.compile_calls import compile_calls
 from ..language.block import Block, Metric
-from ..language.collector import collector_paused
+from ..language.collector import collector_off, collector_paused
 from ..language.errors import AloftError, ExitCode, RunError
 from ..language.stages import CheckedGraph, ClockSpec
 from .failures import describe, locate
@@ -422,16 +422,13 @@ def _collector_paused(*, collect: bool) -> Iterator[None]:
     With ``collect`` garbage is collected before. That takes tens of milliseconds, which count where
     many short runs follow each other as fast as possible.
     """
-    enabled = gc.isenabled()
     with ExitStack() as after:
         if collect:
             gc.collect()
         if not gc.get_freeze_count():
             gc.freeze()
             after.callback(gc.unfreeze)
-        gc.disable()
-        if enabled:
-            after.callback(gc.enable)
+        after.enter_context(collector_off())
         yield
 
 

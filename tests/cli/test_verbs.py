@@ -154,9 +154,12 @@ def test_check_prints_the_schema(call: Call) -> None:
 
 def test_bench_refuses_an_unknown_name(call_json: CallJson) -> None:
     result = call_json("bench", "sheduler", code=2)
-    assert result["reason"].startswith("there is no benchmark 'sheduler'; there is tick, startup")
+    assert result["reason"].startswith("there is no benchmark 'sheduler'; there is tick, solvers,")
     result = call_json("bench", "scheduler", "--seconds", "5", code=2)
-    assert result["reason"] == "--seconds is for recorder, background, export, not for scheduler"
+    assert (
+        result["reason"]
+        == "--seconds is for recorder, background, export, paper_solvers, not for scheduler"
+    )
 
 
 def test_bench_prints_rows_and_exits_by_the_goals(

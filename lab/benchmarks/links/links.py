@@ -30,6 +30,7 @@ from ....runtime.links.free_link import LatestReceiver, LinkHealth
 from ....runtime.links.lockstep_link import LockstepReceiver
 from ....runtime.links.message import HEADER, MessageReader, MessageWriter
 from ....runtime.links.peers import ClockOffset
+from ....runtime.links.traffic import Traffic
 from ....runtime.loading import checked_text
 from ....runtime.placement.placed import MachineLink, PlacedGraph, split_over_machines
 from ....runtime.running.memory import Memory
@@ -95,8 +96,9 @@ blocks:
 class _Known:
     """Stands for the handshake, which is no part of what is measured: the run is known."""
 
-    def __init__(self) -> None:
+    def __init__(self, placed: PlacedGraph, link: MachineLink) -> None:
         self.mailboxes: list[Callable[[], None]] = []
+        self.traffic = {link.sender: Traffic(placed, link.sender, link.receiver)}
 
     def run_of(self, name: str) -> bytes:
         return RUN
@@ -109,6 +111,9 @@ class _Known:
 
     def check(self, tick: int) -> None:
         pass
+
+    def measured(self, name: str) -> str:
+        return self.traffic[name].measured(-1.0)
 
 
 class _End:
@@ -129,7 +134,7 @@ class _End:
         return MessageReader(link, self.memory.bus.layout, self.memory.bus.buffer.data)
 
     def receiver(self, link: MachineLink) -> LockstepReceiver:
-        receiver = LockstepReceiver(link, self.reader(link), _Known(), PATIENCE)  # type: ignore[arg-type]  # stands in for the peers
+        receiver = LockstepReceiver(link, self.reader(link), _Known(self.placed, link), PATIENCE)  # type: ignore[arg-type]  # stands in for the peers
         self.transport.subscribe(
             data_key(link.sender, link.receiver, link.source), receiver.on_message
         )
@@ -303,7 +308,7 @@ def answer(ports: tuple[int, int]) -> None:
         end.transport.subscribe("bare/there", questions.put)
         for link in there:
             counter = LatestReceiver(
-                link, end.reader(link), _Known(),  # type: ignore[arg-type]  # stands in for the peers
+                link, end.reader(link), _Known(placed, link),  # type: ignore[arg-type]  # stands in for the peers
                 LinkPolicy(), LinkHealth.allocate(), lambda reason: None,
             )  # fmt: skip
             end.transport.subscribe(data_key("a", "b", link.source), counter.on_message)

@@ -20,7 +20,7 @@ def test_the_first_deviation_of_a_recording(fall: str) -> None:
     assert told["cause"] == told["chain"][0]
     assert {contact["point"] for contact in told["contacts"]} >= {"left_toe", "right_heel"}
     text = run_here("explain", fall).stdout
-    assert "first deviation at 1.190 s: push: 200 N" in text
+    assert "first deviation at 1.188 s: push: 200 N" in text
     assert "False and missed contacts" in text
 
 

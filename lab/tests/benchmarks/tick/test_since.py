@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.lab.benchmarks.tick import tick
+from aloft.lab.benchmarks import earlier_build
 from aloft.lab.benchmarks.tick.programs import COMPILED, FUSED, earlier_rows
 from aloft.lab.benchmarks.tick.tick import EarlierController
 from aloft.runtime.language.errors import AloftError
@@ -24,7 +24,7 @@ def repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "__main__.py").write_text(MAIN)
     for words in (["init", "-q"], ["add", "."], ["commit", "-qm", "first"]):
         subprocess.run([*GIT, *words], cwd=tmp_path, check=True)
-    monkeypatch.setattr(tick, "ROOT", tmp_path)
+    monkeypatch.setattr(earlier_build, "ROOT", tmp_path)
     return tmp_path
 
 
