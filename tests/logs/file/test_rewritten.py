@@ -41,6 +41,7 @@ def rewritten(whole: Path, to: Path, *arguments: str) -> Path:
     return to
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "how",
     [
@@ -59,6 +60,7 @@ def test_what_has_everything_is_read(whole: Path, tmp_path: Path, how: list[str]
     assert run.keyframes == (20,) and run.snapshot(20) == was.snapshot(20)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("dropped", "text"),
     [
@@ -79,6 +81,7 @@ def test_what_lacks_something_is_refused_by_name(
         read(path)
 
 
+@pytest.mark.long
 def test_a_part_of_a_split_is_refused_and_can_be_read(whole: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "rerun_cli", "rrd", "split", "--timeline", "tick", "-n", "2"]
     subprocess.run(
