@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..runtime.testing.numpy_oracle import arrays_in
 from .kernel_grammar import HEAD, Drawn
 
 PORTABLE_EVERY = 10
@@ -78,17 +79,6 @@ def copied(values: Any) -> Any:
     if isinstance(values, tuple):
         return type(values)(*map(copied, values))
     return [copied(each) for each in values] if isinstance(values, list) else values
-
-
-def arrays_in(values: Any) -> list[Any]:
-    """Return all arrays of arguments."""
-    if isinstance(values, np.ndarray):
-        return [values]
-    return (
-        [found for each in values for found in arrays_in(each)]
-        if isinstance(values, list | tuple)
-        else []
-    )
 
 
 def untouched(function: Any) -> Any:

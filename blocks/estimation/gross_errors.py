@@ -121,9 +121,8 @@ def find_gross_gravity(
             off += d * d
         most = params.gross_gravity * GRAVITY
         gross = not off <= most * most
-    if (
-        still
-    ):  # an IMU that is upside down makes joints move within some ticks, which clears it of nothing
+    # an IMU that is upside down makes joints move within some ticks, which clears it of nothing
+    if still:
         state.gross[3] = state.gross[3] + 1 if gross else 0
         state.rested += 1
     # upside down it makes the robot jerk at the third tick: the first two are enough for so large an error

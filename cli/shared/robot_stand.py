@@ -87,7 +87,6 @@ def stand(
 
 def named_once(name: str, option: str) -> str:
     """Return the robot of the argument or, without one, of the option. Raises ``AloftError`` for two."""
-    default = TrialOptions.__dataclass_fields__["robot"].default
-    if name and option not in (default, name):
+    if name and option not in (TrialOptions.robot, name):
         raise AloftError(f"two robots: {name} and --robot {option}; name one")
     return name or option

@@ -14,7 +14,7 @@ from ...robots.terrain import Terrain, WorldParameters
 from ...runtime.language.block import Block, Port
 from ...runtime.language.layout import Layout
 from ...runtime.language.quantities import Quantity
-from ...runtime.language.signals import Field, Signal
+from ...runtime.language.signals import Field, Signal, Slot
 from ...runtime.language.stages import BlockSpec, CheckedGraph
 from ...runtime.running.memory import BoundGraph
 from .code import needs_code
@@ -203,22 +203,31 @@ def _recorded(
     for name, slot in layout.slots.items():
         signal, field, constant = declared[name]
         quantity = (quantities or {}).get(name) or Quantity(field.unit, field.frame)
-        fields.append(
-            RecordedField(
-                name=name,
-                dtype=slot.section,
-                start=slot.start,
-                shape=slot.shape,
-                dimensions=field.shape,
-                unit=None if quantity.unit is None else str(quantity.unit),
-                frame=quantity.frame,
-                text=field.text,
-                values={int(v): v.name.lower() for v in field.values or ()},
-                constant=constant,
-                signals=_names(signal),
-            )
-        )
+        made = recorded_field(name, slot, field, quantity)
+        fields.append(replace(made, constant=constant, signals=_names(signal)))
     return RecordedLayout(tuple(fields), dict(layout.lengths), dict(layout.offsets), layout.size)
+
+
+def recorded_field(name: str, slot: Slot, field: Field, quantity: Quantity) -> RecordedField:
+    """Describe a field of the bus without the code that declared it.
+
+    Args:
+        name: ``block.port.field``.
+        slot: where it lies.
+        field: its declaration.
+        quantity: the unit and frame of what it carries.
+    """
+    return RecordedField(
+        name=name,
+        dtype=slot.section,
+        start=slot.start,
+        shape=slot.shape,
+        dimensions=field.shape,
+        unit=None if quantity.unit is None else str(quantity.unit),
+        frame=quantity.frame,
+        text=field.text,
+        values={int(v): v.name.lower() for v in field.values or ()},
+    )
 
 
 def _names(signal: type[Signal]) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from math import isfinite
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....logs.file.format import RecordedField
+from ....logs.file.header import recorded_field
 from ....logs.viewing.signal_names import element_names, value_text
 from ....runtime.language.errors import AloftError
 from ....runtime.language.layout import Layout
@@ -46,19 +48,10 @@ class ValueTexts:
                 for name, field in output.signal.fields.items():
                     quantity = spec.quantities.get(f"{port}.{name}")
                     quantity = quantity or Quantity(field.unit, field.frame)
-                    slot = layout.slots[f"{spec.path}.{port}.{name}"]
-                    self._fields.append(
-                        RecordedField(
-                            name=f"{spec.path}.{port}.{name}",
-                            dtype=slot.section,
-                            start=slot.start,
-                            shape=slot.shape,
-                            dimensions=field.shape,
-                            unit="" if quantity.unit_text == "1" else quantity.unit_text,
-                            frame=quantity.frame,
-                            values={int(v): v.name.lower() for v in field.values or ()},
-                        )
-                    )
+                    full_name = f"{spec.path}.{port}.{name}"
+                    made = recorded_field(full_name, layout.slots[full_name], field, quantity)
+                    unit = "" if quantity.unit_text == "1" else quantity.unit_text
+                    self._fields.append(replace(made, unit=unit))
         self._by_name = {field.name: field for field in self._fields}
 
     def all(self, bus: NDArray[np.uint8]) -> dict[str, str]:

@@ -10,7 +10,7 @@ from aloft.runtime.placement.placed import split_over_machines
 from .example_graphs import ring
 
 
-class Now:
+class SetClock:
     def __init__(self) -> None:
         self.time = 100.0
 
@@ -19,13 +19,13 @@ class Now:
 
 
 @pytest.fixture
-def now(monkeypatch: pytest.MonkeyPatch) -> Now:
-    made = Now()
+def now(monkeypatch: pytest.MonkeyPatch) -> SetClock:
+    made = SetClock()
     monkeypatch.setattr(module, "time", made)
     return made
 
 
-def test_a_closed_connection_is_no_silence(now: Now) -> None:
+def test_a_closed_connection_is_no_silence(now: SetClock) -> None:
     placed = split_over_machines(ring())
     found = Traffic(placed, "near", "far")
     assert found.measured(-1.0) == "nothing has come of it" and found.silence() == 0.0
@@ -40,7 +40,7 @@ def test_a_closed_connection_is_no_silence(now: Now) -> None:
     assert "nothing came of it for 3.11 s, and links.lease is 3 s" in text
 
 
-def test_what_was_measured_stands_beside_what_a_tick_needs(now: Now) -> None:
+def test_what_was_measured_stands_beside_what_a_tick_needs(now: SetClock) -> None:
     placed = split_over_machines(ring())
     found = Traffic(placed, "near", "far")
     (link,) = [x for x in placed.sent_by("near") if x.receiver == "far"]

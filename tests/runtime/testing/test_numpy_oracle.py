@@ -23,7 +23,7 @@ class Three(Signal):
     s = Field(unit="1", text="one")
 
 
-class Way(IntEnum):
+class Direction(IntEnum):
     THERE = 0
     BACK = 1
 
@@ -41,7 +41,7 @@ def half(x: float, gain: float = 0.5) -> float:
 @kernel
 def everything(A: Matrix3, u: Vector3, memory: Memory, way: int, y: Array1D) -> None:
     memory.x[:] = half(A @ u) + cross(u, A[0]) - math.sin(y[0]) * np.exp(-abs(u))
-    memory.count[0] += 3 if way == Way.BACK else 5
+    memory.count[0] += 3 if way == Direction.BACK else 5
     y[:] = min(max(memory.x, -1.0), 1.0)
 
 
