@@ -1,13 +1,13 @@
 """Kernels drawn from the whole language, each judged by what nobody here wrote: NumPy, and Numba.
 
 The judge is the function as it is written, which NumPy runs, and ``numba.njit`` of the same source where that takes
-it. Plain Python with its loops, machine code, that of an exported library and a sequence of calls must have the same
-bytes among each other; integers, flags and copies must be NumPy's, and numbers with a fraction as near as rounding allows: what is read
-are multiples of 1/8, so sums and products are exact, and what is left are divisions, roots and elementary functions.
+it. Plain Python with its loops, machine code, a sequence of calls and a library of C that is exported and linked must
+have the same bytes among each other; integers, flags, copies and single operations on exact numbers must be NumPy's,
+and other numbers as near as ``rounding_bounds`` allows.
 
 ::
 
-    python -m aloft.lab.judge_kernels 20000   # about 25 minutes of processor time; --numba 50 asks Numba for every 50th
+    python -m aloft.lab.judge_kernels 20000   # 25 minutes of processor time; --numba 50 asks Numba for every 50th
 """
 
 from __future__ import annotations
