@@ -19,7 +19,6 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +33,7 @@ from ..file.format import Header
 from ..file.held_fields import split_bus
 from .output_file import OutputFile, cause_of, reserve_output, split_name
 from .recorder_protocol import KEYFRAME, NOTE, PART, REWIND, ROW, RecorderReport, RecorderTask
+from .rerun_import import import_rerun
 from .ring import Record, RingReader
 from .writer import RecordingWriter
 
@@ -398,7 +398,7 @@ def main(tasks: str) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     block_pandas_import()
-    import_module("rerun")  # which takes longest, and is needed first when there is a task
+    import_rerun()  # which takes longest, and is needed first when there is a task
     with socket.socket(fileno=int(tasks)) as source_of_tasks:
         task, descriptors, _, _ = socket.recv_fds(source_of_tasks, 1 << 16, 2)
     if not task:
