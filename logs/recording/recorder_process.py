@@ -46,7 +46,7 @@ LIVE_PERIOD = 0.1
 """Seconds after which a viewer is shown what has come."""
 LAST_SYNC = 2.0
 """Seconds that the end waits for the disk."""
-BATCH, BATCH_BYTES = 1024, 1 << 24
+BATCH, BATCH_BYTES = 512, 1 << 24
 """Ticks written at once, and their bytes, at most."""
 SLOW_FLUSH = 4.0
 """Number of flush periods for which ticks may wait that are fewer than those of one period of the
