@@ -87,9 +87,9 @@ def _meshes(
     link: str, look: Appearance, most: int, known: dict[Path, Surface]
 ) -> Iterator[Surface]:
     """Yield the meshes of a link. Raises ``OSError`` or ``ValueError`` with the sentence for the user."""
-    from .importing.meshes import mesh_triangles, simplified  # which read XML
-
     for mesh in look.meshes:
+        from .importing.meshes import mesh_triangles, simplified  # which read XML
+
         path = _path(mesh)
         if path is None:
             raise ValueError(_absent(link, mesh))
