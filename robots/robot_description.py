@@ -502,16 +502,6 @@ class RobotDescription(Element):
         return np.array([angles.get(joint.name, 0.0) for joint in self.joints])
 
     @cached_property
-    def reach(self) -> float:
-        """The largest distance of a link's origin from the base's in the standing pose [m]; 0.1 m for a robot of
-        one link. It is the measure of how large things are drawn."""
-        from .kinematics import link_poses
-
-        base, turn = np.zeros((1, 3)), np.array([[0.0, 0.0, 0.0, 1.0]])
-        poses = link_poses(self, base, turn, self.standing_position[None])
-        return max(0.1, float(np.linalg.norm(poses.position[0], axis=1).max()))
-
-    @cached_property
     def joint_limits(self) -> NDArray[np.float64]:
         """Lower and upper joint limits [rad, or m for a slide], (n_joints, 2); infinite where there are
         none."""

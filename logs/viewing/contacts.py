@@ -19,6 +19,7 @@ from ...robots.kinematics import LinkPoses
 from ...robots.robot_description import RobotDescription
 from ..file.format import PLOTS, Header, RecordedRows, time_columns
 from .drawing import ChangedRows, Moments, SceneDisplay, ThinnedRows
+from .robot_shapes import reach_of
 
 WEIGHT_ARROW = 0.6
 """The length of the arrow of a robot's weight, as a share of the robot's reach. A robot that stands
@@ -36,7 +37,7 @@ ABOVE_GROUND = 0.001
 
 def force_scale(robot: RobotDescription) -> float:
     """Return the length of a force arrow for each newton [m/N]: small robots have small forces."""
-    return WEIGHT_ARROW * robot.reach / robot.weight
+    return WEIGHT_ARROW * reach_of(robot) / robot.weight
 
 
 def force_arrows(robot: RobotDescription, force: Array) -> Array:
@@ -44,7 +45,7 @@ def force_arrows(robot: RobotDescription, force: Array) -> Array:
     allows."""
     arrows = force * force_scale(robot)
     lengths = np.linalg.norm(arrows, axis=-1, keepdims=True)
-    longest = LONGEST_ARROW * robot.reach
+    longest = LONGEST_ARROW * reach_of(robot)
     shorter: Array = arrows * np.minimum(1.0, longest / np.maximum(lengths, 1e-12))
     return shorter
 

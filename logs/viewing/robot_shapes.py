@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...robots.kinematics import link_poses
 from ...robots.robot_description import Link, RobotDescription
 from ...robots.shapes import Capsule, Hull, Shape, edges, surface
 from ...robots.surfaces import RobotSurfaces, Surface, joined, normals, quaternion_from_z
@@ -26,13 +27,23 @@ def shapes_of(robot: RobotDescription, link: Link) -> list[Shape]:
     feet = [foot.name for foot in robot.feet if foot.link == link.name]
     ends = [joint.origin for joint in robot.joints if joint.parent == link.name]
     ends += [contact.position for contact in robot.contacts if contact.foot in feet]
-    radius = 0.025 * robot.reach
+    radius = 0.025 * reach_of(robot)
     return [Capsule(start=(0.0, 0.0, 0.0), end=end, radius=radius) for end in ends]
+
+
+def reach_of(robot: RobotDescription) -> float:
+    """Return the largest distance of a link's origin from the base's in the standing pose [m].
+
+    It is the measure of how large things are drawn; 0.1 m for a robot of one link.
+    """
+    base, turn = np.zeros((1, 3)), np.array([[0.0, 0.0, 0.0, 1.0]])
+    poses = link_poses(robot, base, turn, robot.standing_position[None])
+    return max(0.1, float(np.linalg.norm(poses.position[0], axis=1).max()))
 
 
 def scale_of(robot: RobotDescription) -> float:
     """Return the scale of marks, lines and arrows, as a factor on that of BRUCE."""
-    return robot.reach / USUAL_REACH
+    return reach_of(robot) / USUAL_REACH
 
 
 def eye_controls(
@@ -45,7 +56,7 @@ def eye_controls(
     """
     import rerun.blueprint as rrb
 
-    size = 2.4 * (robot.reach if robot is not None else USUAL_REACH)
+    size = 2.4 * (reach_of(robot) if robot is not None else USUAL_REACH)
     position = tuple(distance * size * part for part in (0.8, -0.6, 0.35))
     height = eye_height(robot) if robot is not None else 0.25 * size
     return rrb.EyeControls3D(
@@ -55,7 +66,7 @@ def eye_controls(
 
 def eye_height(robot: RobotDescription) -> float:
     """Return the height [m] at which the camera looks: that of the base in the standing pose."""
-    return 0.85 * robot.reach
+    return 0.85 * reach_of(robot)
 
 
 HULLS = "hulls"

@@ -12,7 +12,7 @@ from aloft import load
 from aloft.logs import read
 from aloft.logs.recording.recorder import Recorder
 from aloft.logs.viewing.contacts import force_scale
-from aloft.logs.viewing.robot_shapes import drawn_link, drawn_shapes, shapes_of
+from aloft.logs.viewing.robot_shapes import drawn_link, drawn_shapes, reach_of, shapes_of
 from aloft.robots.description import Appearance, Capsule, Hull, Mesh, RobotDescription, find_robot
 from aloft.robots.surfaces import joined, missing_meshes, robot_surfaces
 
@@ -60,10 +60,10 @@ def test_a_link_without_shapes_has_bones_to_its_joints_and_contact_points() -> N
 
 
 def test_a_robot_is_measured_by_its_reach() -> None:
-    assert 0.3 < BRUCE.reach < 0.6
+    assert 0.3 < reach_of(BRUCE) < 0.6
     weight = 9.81 * BRUCE.total_mass
-    assert weight * force_scale(BRUCE) == pytest.approx(0.6 * BRUCE.reach, rel=0.03)
-    assert np.isfinite(BRUCE.changed(joints=(), links=BRUCE.links[:1]).reach)
+    assert weight * force_scale(BRUCE) == pytest.approx(0.6 * reach_of(BRUCE), rel=0.03)
+    assert np.isfinite(reach_of(BRUCE.changed(joints=(), links=BRUCE.links[:1])))
 
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
