@@ -12,8 +12,8 @@ import numpy as np
 
 from ...mathematics.arrays import Array, Indices
 from ...mathematics.compiling.lanes import Lanes
+from ..models.interpreted import InterpretedFunction
 from ..problem.assembly import Assembly
-from .interpreted import InterpretedFunction
 
 
 class _Piece(NamedTuple):
@@ -58,17 +58,9 @@ class ConstraintValues:
         found = []
         for name, users in assembly.users.items():
             function: InterpretedFunction = getattr(assembly.pieces[name], kind)
-            lanes = Lanes(
-                function.program, len(users),
-                [len(each.rows) for each in function.inputs],
-                [len(each.rows) for each in function.outputs],
-            )  # fmt: skip
-            found.append(
-                _Piece(
-                    lanes, assembly.piece_columns[name], assembly.piece_parameters[name],
-                    lanes.outputs[result],
-                )
-            )  # fmt: skip
+            columns, parameters = assembly.piece_columns[name], assembly.piece_parameters[name]
+            lanes = function.lanes(len(users))
+            found.append(_Piece(lanes, columns, parameters, lanes.outputs[result]))
         return found
 
     def set_parameters(self, parameters: Array) -> None:
