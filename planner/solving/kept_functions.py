@@ -36,7 +36,7 @@ SOURCES = (
     "problem/leg_rows.py",
     "problem/obstacles.py",
 )
-KINDS = ("value", "jacobian", "hessian")
+KINDS = ("value", "gradient", "jacobian", "hessian")
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, steps done and steps in all."""
 
