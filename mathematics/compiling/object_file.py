@@ -40,7 +40,7 @@ _VALUES: dict[int, Callable[[int, int, int, int], int]] = {
 GOT64 and GOTPC64."""
 
 
-class Placed(NamedTuple):
+class CodeInMemory(NamedTuple):
     """Code in memory, which goes with this object."""
 
     memory: mmap.mmap
@@ -61,7 +61,7 @@ class _Section(NamedTuple):
     entry: int
 
 
-def place(code: bytes, wanted: str) -> Placed | None:
+def place(code: bytes, wanted: str) -> CodeInMemory | None:
     """Place an object file in memory, and return it with the address of one of its symbols; ``None`` where it has
     something that is not known here, or is damaged, or the system is another."""
     if sys.platform != "linux":
@@ -72,7 +72,7 @@ def place(code: bytes, wanted: str) -> Placed | None:
         return None
 
 
-def _placed(code: bytes, wanted: bytes) -> Placed:
+def _placed(code: bytes, wanted: bytes) -> CodeInMemory:
     mark, kind, machine, *_ = header = _HEADER.unpack_from(code)
     if mark[:6] != b"\x7fELF\x02\x01" or kind != 1 or machine != X86_64:
         raise ValueError("no relocatable object file for x86-64")
@@ -130,7 +130,7 @@ def _placed(code: bytes, wanted: bytes) -> Placed:
         raise ValueError(f"no symbol {wanted.decode()}")
     if _protect()(base, len(memory), mmap.PROT_READ | mmap.PROT_EXEC):
         raise ValueError("this system lets no memory become code")
-    return Placed(memory, address)
+    return CodeInMemory(memory, address)
 
 
 def _text(code: bytes, start: int) -> bytes:

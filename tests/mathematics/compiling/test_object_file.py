@@ -66,7 +66,7 @@ def test_placed_code_computes_what_linked_code_does(code):
 
 def test_placed_code_reports_errors(code):
     made = MachineCode(code)
-    assert isinstance(made._loaded, object_file.Placed)
+    assert isinstance(made._loaded, object_file.CodeInMemory)
     words = pack((np.zeros(3), 3, np.zeros(1)))
     with pytest.raises(ZeroDivisionError):
         made.function(ctypes.c_size_t(words.ctypes.data))
