@@ -79,14 +79,14 @@ class FaultDetector(Block):
       carry the robot. Neither the estimated attitude nor the switches are in it; the slope of the ground is, so it is a coarse check.
     * In squat and thrust, and after touchdown, while points stand and the legs' torques carry more than ``open_load``, the accelerometer reads less than ``gross_push`` of
       what they push, along the same normal. In healthy runs it read 0.56 to 1.5 times as much.
-    * In squat and thrust, under the same load, the force across that the legs lack is more than ``gross_across`` weights, as where the accelerometer's x or y has the
-      wrong sign. In healthy runs it was 0.91 at most.
+    * In squat and thrust, under the same load, the accelerometer's x or y differs from what the legs push by more than ``gross_across`` weights, and fits with
+      the other sign.
     * Before lift-off the plane of the points that stand has turned by more than ``gross_lean`` in the estimate since the robot first stood. Ground does not
       turn; the attitude is wrong, as by a bias of the gyroscope that is below ``gross_rate``, and the robot is pushed over an edge of its feet.
     * In squat and thrust no switch is closed for ``gross_open`` under feet that carry more than ``open_load``: its lift-off would be missed.
-    * In flight, ``settle_time`` after lift-off, the accelerometer's z reads more than ``gross_landing`` while no switch is closed: the robot has landed
+    * In flight, from 50 ms before the touchdown is due, the accelerometer's z reads more than ``gross_landing`` while no switch is closed: the robot has landed
       with switches that stay open, and its legs still hold the pose of the flight.
-    * After touchdown the gyroscope reads more than ``falling_rate`` about the base's level axes for ``falling_time``, 40 ms after the impact or later: the robot
+    * After touchdown the base leans over by more than ``falling_rate`` for ``falling_time``, 40 ms after the impact or later: the robot
       falls, whatever the cause, and damped legs break less.
 
     Gravity must be off for ``gross_time``, what has no time of its own for ``lateness`` more. The sign of the accelerometer's x and y cannot be seen in an upright stand: turn the robot by hand

@@ -105,7 +105,7 @@ class FaultDetectorParams(Parameters):
     )  # fmt: skip
     gross_across: float = parameter(
         1.2, ge=0.0,
-        text="force across the plane of the feet that the accelerometer may lack in squat and thrust, in weights; zero: any",
+        text="force along x or y, in weights, by which legs and accelerometer may differ in squat and thrust where the other sign fits; zero: any",
     )  # fmt: skip
     gross_lean: float = parameter(
         0.05, unit="rad", ge=0.0,
@@ -121,7 +121,7 @@ class FaultDetectorParams(Parameters):
     )  # fmt: skip
     falling_rate: float = parameter(
         4.0, unit="rad/s", ge=0.0,
-        text="rate about level axes for `falling_time` after touchdown that is a fall; zero: none",
+        text="rate of leaning over for `falling_time` after touchdown that is a fall; zero: none",
     )  # fmt: skip
     falling_time: float = parameter(0.02, unit="s", ge=0.0, text="see `falling_rate`")
     suspects_end: bool = parameter(

@@ -32,6 +32,12 @@ _FAST = 5.0
 """How much larger ``gross_rate`` is in the thrust."""
 _IMPACT = 0.04
 """For so long after a touchdown [s] any rate is that of the impact."""
+_MOST = 5.0
+"""A leg that is nearly straight seems to push more than so many weights, of which its torques say little."""
+_LEANS = 0.05
+"""Sine of a lean below which its direction is that of noise."""
+_DUE = 0.05
+"""Flights whose touchdown is due within this time [s] may end unseen; before, limbs that are drawn in move the base."""
 _PUSH, _ACROSS, _LEAN, _OPEN, _LANDED, _FALL = range(4, 10)
 """Elements of ``FaultDetectorState.gross``; the first three are the gyroscope's axes, then gravity."""
 _SPREAD = 0.05
@@ -173,7 +179,7 @@ def find_gross_errors(
         pushed += load.force[foot] / constants.weight
     for point in range(switches.closed.shape[0]):
         open = open and not switches.closed[point]
-    heavy = pushed > params.open_load
+    heavy = pushed > params.open_load and pushed < _MOST
     find_gross_push(
         (jumps or landed) and rigid and heavy, pushed, imu, terms, phase, state, params, constants, scratch,
     )  # fmt: skip
@@ -183,17 +189,19 @@ def find_gross_errors(
         state, _OPEN, jumps and heavy and open and params.gross_open > 0.0, constants.gross_ticks[2]
     ):
         state.stop = Stop.SWITCHES
-    flies = phase.phase == Phase.FLIGHT and phase.time_in_phase > params.settle_time
+    flies = phase.phase == Phase.FLIGHT and phase.time_to_touchdown < _DUE
     most = params.gross_landing * GRAVITY
     strikes = flies and open and most > 0.0 and not imu.specific_force[2] <= most
     if persists(state, _LANDED, strikes, constants.gross_ticks[0]):
         state.stop = Stop.LANDED
         state.reading[:] = imu.specific_force
     landed = landed and phase.time_since_touchdown > _IMPACT
-    turning = imu.angular_velocity[0] * imu.angular_velocity[0]
-    turning += imu.angular_velocity[1] * imu.angular_velocity[1]
+    # the base's z leans over by the rate across the direction in which it leans
+    x, y = terms.base_rotation[2, 0], terms.base_rotation[2, 1]
+    lean = math.sqrt(x * x + y * y)
+    leaning = y * imu.angular_velocity[0] - x * imu.angular_velocity[1]
     most = params.falling_rate
-    falls = landed and most > 0.0 and not turning <= most * most
+    falls = landed and lean > _LEANS and most > 0.0 and not leaning <= most * lean
     if persists(state, _FALL, falls, constants.gross_ticks[3]):
         state.stop = Stop.FALL
         state.reading[:] = imu.angular_velocity
@@ -309,12 +317,16 @@ def find_gross_force_across(
     constants: FaultDetectorConstants,
     scratch: FaultDetectorScratch,
 ) -> None:
-    """Count the ticks of squat and thrust in which the legs lack much of the force across that the accelerometer reads."""
+    """Count the ticks of squat and thrust in which the legs lack much of the force across that the accelerometer reads, and
+    would lack little with the other sign of its x or y."""
     gross = False
     if judged and params.gross_across > 0.0:
         weigh(imu, joints, terms, constants, scratch)
-        x, y, most = scratch.lacking[0], scratch.lacking[1], params.gross_across * constants.weight
-        gross = not x * x + y * y <= most * most
+        mass = constants.weight / GRAVITY
+        for axis in range(2):
+            off, mirrored = scratch.lacking[axis], 2.0 * mass * imu.specific_force[axis]
+            fits = abs(off - mirrored) < 0.5 * abs(off)
+            gross = gross or (fits and abs(off) > params.gross_across * constants.weight)
     if persists(state, _ACROSS, gross, constants.gross_ticks[0]):
         state.stop = Stop.PUSH
         state.reading[:] = imu.specific_force
