@@ -88,9 +88,10 @@ def axes_look_like(read: Array, right: Array) -> str:
 def push_looks_like(read: Array, right: Array) -> str:
     """Say which error of a driver a reading in squat or thrust looks like."""
     along = float(read @ right / (right @ right))
+    length = float(np.sqrt((read @ read) / (right @ right)))
     if -2.0 < along < -0.5:
         return ": its sign looks wrong"
-    if 0.5 / GRAVITY < along < 2.0 / GRAVITY:
+    if 0.5 / GRAVITY < along <= length < 2.0 / GRAVITY:
         return ": it looks like g in place of m/s^2"
     return axes_look_like(read, right)
 
@@ -330,7 +331,9 @@ def find_gross_force_across(
     if persists(state, _ACROSS, gross, constants.gross_ticks[0]):
         state.stop = Stop.PUSH
         state.reading[:] = imu.specific_force
-        state.right[:] = imu.specific_force - scratch.lacking * (GRAVITY / constants.weight)
+        state.right[:] = imu.specific_force
+        for axis in range(2):
+            state.right[axis] -= scratch.lacking[axis] * GRAVITY / constants.weight
 
 
 @kernel
