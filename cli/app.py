@@ -7,6 +7,7 @@ import gc
 import sys
 import traceback
 from collections.abc import Iterable
+from copy import copy
 from importlib import import_module
 from typing import Annotated, Any, cast
 
@@ -28,12 +29,14 @@ IN_FILE_OF = {"doctor": "check"}
 GROUPS = ("robot",)
 """The groups of the core to which extensions may add verbs, declared as ``robot reach``."""
 
-ONLY_READ = ("check", "graph", "blocks")
-"""The verbs that leave nothing to be closed at the end of the process."""
 
-
-def make_app(verbs: Iterable[str] | None = None) -> typer.Typer:
+def make_app(verbs: Iterable[str] | None = None, inner: str = "") -> typer.Typer:
     """Make the command line with those verbs, or with all; the files of others are not imported.
+
+    Args:
+        verbs: of the core and of extensions.
+        inner: the command that is called of a verb that is a group with commands of extensions;
+            the others are left out.
 
     Raises:
         ExtensionError: an extension's declaration is wrong.
@@ -46,7 +49,7 @@ def make_app(verbs: Iterable[str] | None = None) -> typer.Typer:
         rich_markup_mode=None,
     )
     for verb in all_verbs() if verbs is None else verbs:
-        offered = _of_the_core(verb) if verb in VERBS else _of_extensions(verb)
+        offered = _of_the_core(verb, inner) if verb in VERBS else _of_extensions(verb)
         if isinstance(offered, typer.Typer):
             whole_summaries(offered)
             app.add_typer(offered)
@@ -56,21 +59,34 @@ def make_app(verbs: Iterable[str] | None = None) -> typer.Typer:
     return app
 
 
-def _of_the_core(verb: str) -> Any:
+def _of_the_core(verb: str, inner: str) -> Any:
     offered = getattr(import_module(f".{IN_FILE_OF.get(verb, verb)}", __package__), verb)
-    if verb in GROUPS:
-        from ..runtime.language.extensions import extensions
+    return _group(offered, verb, inner) if verb in GROUPS else offered
 
-        for each in extensions():
-            for name, target in each.verbs.items():
-                group, _, inner = name.partition(" ")
-                if group == verb and inner:
-                    found = each.load(target)
-                    if isinstance(found, typer.Typer):
-                        offered.add_typer(found, name=inner)
-                    else:
-                        offered.command(inner)(found)
-    return offered
+
+def _group(core: typer.Typer, verb: str, inner: str) -> typer.Typer:
+    """Return a group with the commands of the core and of extensions, or with one of them alone."""
+    from ..runtime.language.extensions import extensions
+
+    theirs = {
+        name.partition(" ")[2]: (each, target)
+        for each in extensions()
+        for name, target in each.verbs.items()
+        if name.startswith(verb + " ")
+    }
+    ours = {str(each.name): each for each in core.registered_commands}
+    one = (inner in ours) != (inner in theirs)  # any other word shows or names them all
+    group = copy(core)
+    group.registered_commands = [ours[name] for name in ours if not one or name == inner]
+    group.registered_groups = list(core.registered_groups)
+    for name, (each, target) in theirs.items():
+        if not one or name == inner:
+            found = each.load(target)
+            if isinstance(found, typer.Typer):
+                group.add_typer(found, name=name)
+            else:
+                group.command(name)(found)
+    return group
 
 
 def _of_extensions(verb: str) -> Any:
@@ -130,13 +146,13 @@ def _options(
 
 def main() -> None:
     """Run the command line and leave with one of ``ExitCode``."""
-    if any(verb in ONLY_READ for verb in sys.argv[1:2]):
-        # At its end Python looks for garbage once more, which takes a quarter of the time of a check.
-        atexit.register(gc.freeze)
+    # At its end Python looks for garbage once more, which takes a quarter of the time of a run. What must be
+    # closed has been closed by then; registered first, this is called after all others.
+    atexit.register(gc.freeze)
     # typer exports only the most special of the errors that a wrong command line raises
     usage_error = cast("type[Exception]", typer.BadParameter.__bases__[0])
     try:
-        command = typer.main.get_command(make_app(chosen_verbs(sys.argv[1:])))
+        command = typer.main.get_command(make_app(chosen_verbs(sys.argv[1:]), *sys.argv[2:3]))
         name_values(command)
         code = command(standalone_mode=False)
     except usage_error as caught:

@@ -15,6 +15,9 @@ from .kernel import kernel
 TOGETHER = 4
 """Columns that are eliminated together."""
 
+# Loops over a column are functions of their own: an index that is a sum is checked for overflow, and such a loop is
+# not done with the processor's vectors.
+
 
 @kernel
 def assemble_normal(
@@ -48,8 +51,7 @@ def assemble_normal(
             reach = max(reach, last[i])
         if reach - j >= band.shape[1]:
             return False
-        for k in range(reach - j + 1):
-            band[j, k] = 0.0
+        fill_zeros(band[j, : reach - j + 1])
     for column in range(inverse_weights.shape[0]):
         # Most rows of a column are inequalities that are left out.
         count = 0
@@ -91,30 +93,62 @@ def factorise_band(equations: int, regularisation: float, band: Array2D, last: I
                 return False
             root = math.sqrt(pivot)
             width = last[j] - j
-            for k in range(width + 1):
-                band[j, k] = band[j, k] / root
+            divide(band[j, : width + 1], root)
             for k in range(1, width + 1):
                 if band[j, k] != 0.0:
                     last[j + k] = max(last[j + k], last[j])
             for k in range(1, min(width + 1, stop - j)):
                 value = band[j, k]
                 if value != 0.0:
-                    for m in range(width - k + 1):
-                        band[j + k, m] = band[j + k, m] - value * band[j, k + m]
+                    subtract_product(band[j + k, : width - k + 1], value, band[j, k : width + 1])
             end = max(end, last[j])
         if stop - first < TOGETHER:
             return True
-        # Sums of numbers that are not negative, so that no index can count from the end.
         for k in range(1, end - stop + 2):
             one, two = band[first, k + 3], band[first + 1, k + 2]
             three, four = band[first + 2, k + 1], band[first + 3, k]
             if one != 0.0 or two != 0.0 or three != 0.0 or four != 0.0:
-                for m in range(end - stop - k + 2):
-                    value = band[first + 3 + k, m] - one * band[first, k + 3 + m]
-                    value = value - two * band[first + 1, k + 2 + m]
-                    value = value - three * band[first + 2, k + 1 + m]
-                    band[first + 3 + k, m] = value - four * band[first + 3, k + m]
+                width = end - stop - k + 2
+                subtract_products(
+                    band[first + 3 + k, :width],
+                    one, band[first, k + 3 : k + 3 + width], two, band[first + 1, k + 2 : k + 2 + width],
+                    three, band[first + 2, k + 1 : k + 1 + width], four, band[first + 3, k : k + width],
+                )  # fmt: skip
     return True
+
+
+@kernel
+def fill_zeros(values: Array1D) -> None:
+    """Set all values to zero."""
+    for m in range(values.shape[0]):
+        values[m] = 0.0
+
+
+@kernel
+def divide(values: Array1D, divisor: float) -> None:
+    """Divide all values by one."""
+    for m in range(values.shape[0]):
+        values[m] = values[m] / divisor
+
+
+@kernel
+def subtract_product(target: Array1D, one: float, first: Array1D) -> None:
+    """Subtract a multiple of a column from a column."""
+    for m in range(target.shape[0]):
+        target[m] = target[m] - one * first[m]
+
+
+@kernel
+def subtract_products(
+    target: Array1D, one: float, first: Array1D, two: float, second: Array1D,
+    three: float, third: Array1D, four: float, fourth: Array1D,
+) -> None:  # fmt: skip
+    """Subtract four multiples of columns from a column, one after the other."""
+    for m in range(target.shape[0]):
+        value = target[m] - one * first[m]
+        value = value - two * second[m]
+        value = value - three * third[m]
+        target[m] = value - four * fourth[m]
 
 
 @kernel
@@ -123,13 +157,22 @@ def solve_band(equations: int, band: Array2D, last: Indices1D, vector: Array1D) 
     for j in range(equations):
         value = vector[j] / band[j, 0]
         vector[j] = value
-        for k in range(1, last[j] - j + 1):
-            vector[j + k] = vector[j + k] - value * band[j, k]
+        width = last[j] - j
+        subtract_product(vector[j + 1 : j + 1 + width], value, band[j, 1 : width + 1])
     for j in range(equations - 1, -1, -1):
-        value = vector[j]
-        for k in range(1, last[j] - j + 1):
-            value -= band[j, k] * vector[j + k]
-        vector[j] = value / band[j, 0]
+        width = last[j] - j
+        vector[j] = (
+            without_products(vector[j], band[j, 1 : width + 1], vector[j + 1 : j + 1 + width])
+            / band[j, 0]
+        )
+
+
+@kernel
+def without_products(value: float, first: Array1D, second: Array1D) -> float:
+    """Return the value less the products of two vectors, one after the other."""
+    for m in range(first.shape[0]):
+        value -= first[m] * second[m]
+    return value
 
 
 @kernel

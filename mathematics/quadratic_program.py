@@ -163,6 +163,8 @@ def _any_solver(name: str, options: Mapping[str, float]) -> Solve:
     as_taken = (lambda matrix: matrix) if name in dense_solvers else _sparse
 
     def solve(p: Array, q: Array, g: Array, h: Array, a: Array, b: Array) -> Array | None:
+        if not all(np.isfinite(each).all() for each in (p, q, g, h, a, b)):
+            return None  # ProxQP would iterate on what is no number for half a minute
         matrices = [as_taken(matrix) for matrix in (p, g, a)]
         problem = Problem(matrices[0], q, matrices[1], h, matrices[2], b)
         with (

@@ -211,6 +211,13 @@ UNUSED = {
     "aloft.mathematics.banded_system.solve_band": (
         3, np.array([[3.0, 0.5], [4.0, -0.7], [2.0, 0.0]]), np.array([1, 2, 2]), NORMAL(3),
     ),
+    "aloft.mathematics.banded_system.fill_zeros": (NORMAL(3),),
+    "aloft.mathematics.banded_system.divide": (NORMAL(3), 1.7),
+    "aloft.mathematics.banded_system.subtract_product": (NORMAL(3), 0.3, NORMAL(3)),
+    "aloft.mathematics.banded_system.subtract_products": (
+        NORMAL(21), 0.3, NORMAL(21), -0.2, NORMAL(21), 0.0, NORMAL(21), 1.4, NORMAL(21),
+    ),
+    "aloft.mathematics.banded_system.without_products": (0.7, NORMAL(3), NORMAL(3)),
     "aloft.mathematics.banded_system.smallest_correction": (
         CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3),
         np.array([3]), 1e-12, np.zeros((3, 3)), *np.zeros((2, 3), dtype=np.int64), NORMAL(3),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ...mathematics.inertial_filter import correct_tilt_from_gravity
 from ...mathematics.kernel import kernel
 from ..signals import BaseState, ImuReading, JointState
@@ -69,6 +71,6 @@ class ComplementaryFilter(InertialEstimator):
                 estimate.orientation, scratch.force, constants.tilt_gain, scratch.vector
             )
         set_point_positions(estimate, legs)
-        points.weights[:] = 1.0 if points.active else 0.0
+        points.weights[:] = np.where(points.active, 1.0, 0.0)
         correct_motion(estimate, legs, params, constants, scratch, 1.0, 1.0)
         publish(estimate, base)

@@ -46,6 +46,10 @@ class Assembly:
         gap_start, row_start: where its gap rows and its other rows begin among the constraints;
             the kept rows of its pieces follow each other in the order of ``Knot.pieces``.
         parameter_start: (piece, knot) -> where the piece's parameters begin.
+        users: by piece the knots that have it, of which the next ones have a row each:
+        piece_columns, piece_rows: the indices of a piece's variables and of its rows, -1 for those left out.
+        piece_parameters: by piece all of its parameters.
+        linear_terms: rows, variables and signs of what the rows have beside the pieces.
     """
 
     def __init__(self, knots: Sequence[Knot], pieces: Mapping[str, StageFunction]) -> None:
@@ -69,11 +73,13 @@ class Assembly:
         }
         self.users = {name: users for name, users in self.users.items() if users}
         self.parameter_start: dict[tuple[str, int], int] = {}
-        self._parameters_of: dict[str, slice] = {}
+        self.piece_parameters: dict[str, slice] = {}
         self.parameters = 0
         for name, users in self.users.items():
             size = int(pieces[name].value.size1_in(1))
-            self._parameters_of[name] = slice(self.parameters, self.parameters + size * len(users))
+            self.piece_parameters[name] = slice(
+                self.parameters, self.parameters + size * len(users)
+            )
             for k in users:
                 self.parameter_start[name, k] = self.parameters
                 self.parameters += size
@@ -108,8 +114,8 @@ class Assembly:
 
     def _place(self) -> None:
         """Compute the global indices of every piece's variables and rows; -1 for rows left out."""
-        self._columns: dict[str, Indices] = {}
-        self._rows: dict[str, Indices] = {}
+        self.piece_columns: dict[str, Indices] = {}
+        self.piece_rows: dict[str, Indices] = {}
         for name, users in self.users.items():
             count = self.pieces[name].rows
             columns, rows = [], np.full((len(users), count), -1, dtype=np.int64)
@@ -120,7 +126,7 @@ class Assembly:
                     gap = self.nx[k + 1] - (self.knots[k].hold is not None)
                     rows[i, :gap] = self.gap_start[k] + np.arange(gap)
                 rows[i, kept] = self.rows_of(name, k)[0] + np.arange(len(kept))
-            self._columns[name], self._rows[name] = np.array(columns), rows
+            self.piece_columns[name], self.piece_rows[name] = np.array(columns), rows
         # next state: + in its gap row; a held control: - in the last gap row
         linear_rows, linear_columns, signs = [], [], []
         for k, knot in enumerate(self.knots):
@@ -137,7 +143,7 @@ class Assembly:
                 linear_rows.append(self.gap_start[k] + size - 1)
                 linear_columns.append(self.control_start[k] + knot.hold)
                 signs.append(-1.0)
-        self._linear = (
+        self.linear_terms = (
             np.array(linear_rows, dtype=np.int64),
             np.array(linear_columns, dtype=np.int64),
             np.array(signs),
@@ -160,14 +166,14 @@ class Assembly:
         padded = ca.vertcat(lam_g, 0.0)
         for name, users in self.users.items():
             piece, count = self.pieces[name], len(users)
-            z = _gather(x, self._columns[name].ravel(), (-1, count))
-            w = ca.reshape(p[self._parameters_of[name]], -1, count)
+            z = _gather(x, self.piece_columns[name].ravel(), (-1, count))
+            w = ca.reshape(p[self.piece_parameters[name]], -1, count)
             costs, rows = piece.value.map(count)(z, w)
             cost = cost + ca.sum2(costs)
             value_rows.append(ca.vec(rows))
             gradient.append(ca.vec(piece.jacobian.map(count)(z, w)[1]))
-            jacobian_cost_rows.append(self._columns[name].ravel())
-            index = np.where(self._rows[name] < 0, self.constraints, self._rows[name])
+            jacobian_cost_rows.append(self.piece_columns[name].ravel())
+            index = np.where(self.piece_rows[name] < 0, self.constraints, self.piece_rows[name])
             multipliers = _gather(padded, index.ravel(), (-1, count))
             slope, hessian = piece.hessian.map(count)(z, w, ca.repmat(lam_f, 1, count), multipliers)
             slopes.append(ca.vec(slope))
@@ -176,7 +182,7 @@ class Assembly:
         columns = np.concatenate(jacobian_cost_rows)
         grad = _scatter(ca.vertcat(*gradient), columns, self.variables)
         whole, *triangle = self._hessian(hessian_values, upper)
-        linear_rows, linear_columns, signs = self._linear
+        linear_rows, linear_columns, signs = self.linear_terms
         pushed = _gather(lam_g, linear_rows, (-1, 1)) * ca.DM(signs)
         slope = _scatter(
             ca.vertcat(*slopes, pushed), np.concatenate([columns, linear_columns]), self.variables
@@ -212,8 +218,8 @@ class Assembly:
         x, p = ca.MX.sym("x", self.variables), ca.MX.sym("p", self.parameters)
         rows, values = [], []
         for name, users in self.users.items():
-            z = _gather(x, self._columns[name].ravel(), (-1, len(users)))
-            w = ca.reshape(p[self._parameters_of[name]], -1, len(users))
+            z = _gather(x, self.piece_columns[name].ravel(), (-1, len(users)))
+            w = ca.reshape(p[self.piece_parameters[name]], -1, len(users))
             found, _, jacobian = self.pieces[name].jacobian.map(len(users))(z, w)
             rows.append(ca.vec(found))
             values.append(_nonzeros(jacobian))
@@ -221,38 +227,48 @@ class Assembly:
         return ca.Function("nlp_jac_g", [x, p], [self._sum_rows(x, rows), matrix],
                            ["x", "p"], ["g", "jac_g_x"])  # fmt: skip
 
+    def row_sources(self) -> Indices:
+        """Return by row its place among the rows of all pieces side by side; behind them is a zero."""
+        index = np.concatenate([self.piece_rows[name].ravel() for name in self.users])
+        source = np.full(self.constraints, len(index), dtype=np.int64)
+        source[index[index >= 0]] = np.flatnonzero(index >= 0)
+        return source
+
     def _sum_rows(self, x: Any, rows: list[Any]) -> Any:
         import casadi as ca
 
-        index = np.concatenate([self._rows[name].ravel() for name in self.users])
-        source = np.full(self.constraints, len(index), dtype=np.int64)
-        source[index[index >= 0]] = np.flatnonzero(index >= 0)
-        linear_rows, linear_columns, signs = self._linear
-        sums = _gather(ca.vertcat(*rows, 0.0), source, (-1, 1))
+        linear_rows, linear_columns, signs = self.linear_terms
+        sums = _gather(ca.vertcat(*rows, 0.0), self.row_sources(), (-1, 1))
         matrix = _sparse(linear_rows, linear_columns, (self.constraints, self.variables))
         order = _positions(matrix, linear_rows, linear_columns)
         values = np.zeros(len(signs))
         values[order] = signs
         return sums + ca.mtimes(ca.DM(matrix, values), x)
 
-    def _jacobian(self, values: list[Any]) -> Any:
-        import casadi as ca
-
+    def jacobian_pattern(self) -> tuple[Any, Indices]:
+        """Return where the Jacobian has entries, and by entry its place among those of all pieces side by side; behind
+        them are the signs of the linear terms.
+        """
         rows, columns = [], []
-        for name, users in self.users.items():
+        for name in self.users:
             triplets = self.pieces[name].jacobian.sparsity_out(2).get_triplet()
             local_rows, local_columns = (np.array(x, dtype=np.int64) for x in triplets)
-            rows.append(self._rows[name][:, local_rows].ravel())
-            columns.append(self._columns[name][:, local_columns].ravel())
-            assert len(users) == len(self._rows[name])
-        linear_rows, linear_columns, signs = self._linear
+            rows.append(self.piece_rows[name][:, local_rows].ravel())
+            columns.append(self.piece_columns[name][:, local_columns].ravel())
+        linear_rows, linear_columns, _ = self.linear_terms
         row = np.concatenate([*rows, linear_rows])
         column = np.concatenate([*columns, linear_columns])
         kept = row >= 0
         pattern = _sparse(row[kept], column[kept], (self.constraints, self.variables))
         source = np.empty(pattern.nnz(), dtype=np.int64)
         source[_positions(pattern, row[kept], column[kept])] = np.flatnonzero(kept)
-        everything = ca.vertcat(*values, ca.DM(signs))
+        return pattern, source
+
+    def _jacobian(self, values: list[Any]) -> Any:
+        import casadi as ca
+
+        pattern, source = self.jacobian_pattern()
+        everything = ca.vertcat(*values, ca.DM(self.linear_terms[2]))
         return ca.MX(pattern, _gather(everything, source, (-1, 1)))
 
     def _hessian(self, values: list[Any], upper: bool) -> list[Any]:
@@ -263,8 +279,8 @@ class Assembly:
         for name in self.users:
             triplets = self.pieces[name].hessian.sparsity_out(1).get_triplet()
             local_rows, local_columns = (np.array(x, dtype=np.int64) for x in triplets)
-            rows.append(self._columns[name][:, local_rows].ravel())
-            columns.append(self._columns[name][:, local_columns].ravel())
+            rows.append(self.piece_columns[name][:, local_rows].ravel())
+            columns.append(self.piece_columns[name][:, local_columns].ravel())
         row, column = np.concatenate(rows), np.concatenate(columns)
         everything = ca.vertcat(*values, 0.0)
         found = []

@@ -26,6 +26,11 @@ _OTHER = {
     "NE": "not_equal", "IF_ELSE_ZERO": "if", "CONSTPOW": "pow",
 }  # fmt: skip
 """CasADi's names of operations, of which ``_SAME`` are the same, and those of ``OPERATIONS``."""
+_END, _CONSTANT, _READ, _WRITE = (
+    OPERATIONS.index(name) for name in ("end", "constant", "input", "output")
+)
+TOGETHER = 512
+"""Steps that may change places; a half and twice as many are slower."""
 
 
 @cache
@@ -47,13 +52,10 @@ def read_program(function: Any) -> Program:
     import casadi as ca
 
     places = _places()
-    constant, read, write = (OPERATIONS.index(each) for each in ("constant", "input", "output"))
     values = [0] * function.sz_w()
     """By CasADi's slot the number of the value that is in it now."""
     known: dict[tuple[Any, ...], int] = {}
     steps: list[tuple[int, ...]] = []
-    last: list[int] = []
-    """By value the last step that needs it."""
     constants: list[float] = []
     for k in range(function.n_instructions()):
         operation = function.instruction_id(k)
@@ -67,46 +69,84 @@ def read_program(function: Any) -> Program:
         elif operation == ca.OP_CONST:
             number = function.instruction_constant(k)
             key = (number.hex(),)  # which tells zeros apart
-            step = (constant, len(constants), 0)
+            step = (_CONSTANT, len(constants), 0)
         elif operation == ca.OP_INPUT:
-            step = (read, *function.instruction_input(k))
+            step = (_READ, *function.instruction_input(k))
             key = ("input", *step)
         elif operation == ca.OP_OUTPUT:
-            value = values[function.instruction_input(k)[0]]
-            last[value] = len(steps)
-            steps.append((write, goal[0], value, goal[1]))
+            steps.append((_WRITE, goal[0], values[function.instruction_input(k)[0]], goal[1]))
             continue
         else:
             raise ValueError(
                 f"{function.name()}: instruction {k} is CasADi's operation {operation}, which is not interpreted"
             )
-        value = known.setdefault(key, len(last))
-        if value == len(last):
-            last.append(len(steps))
-            if operation in places:
-                last[first] = last[second] = len(steps)
-            steps.append((step[0], value, *step[1:]))
+        if key not in known:
+            known[key] = len(known)
+            steps.append((step[0], known[key], *step[1:]))
             if operation == ca.OP_CONST:
                 constants.append(number)
-        values[goal[0]] = value
-    return _placed(steps, last, np.array(constants))
+        values[goal[0]] = known[key]
+    return _placed(_grouped(steps), len(known), np.array(constants))
 
 
-def _placed(steps: list[tuple[int, ...]], last: list[int], constants: Array) -> Program:
+def _operands(step: tuple[int, ...]) -> set[int]:
+    """Return the values that a step needs."""
+    operation, _, first, second = step
+    if operation == _WRITE:
+        return {first}
+    return set() if operation in (_CONSTANT, _READ) else {first, second}
+
+
+def _grouped(steps: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
+    """Return the steps in an order in which equal operations follow each other, so that the processor foresees them.
+
+    They change places only within some that follow each other, or so many values would wait at once that the
+    processor's nearest memory could not hold them.
+    """
+    found: list[tuple[int, ...]] = []
+    for first in range(0, len(steps), TOGETHER):
+        some = steps[first : first + TOGETHER]
+        made = {step[1] for step in some if step[0] != _WRITE}
+        missing: list[int] = []
+        needed_by: dict[int, list[int]] = {}
+        ready: dict[int, list[int]] = {}
+        for k, step in enumerate(some):
+            own = _operands(step) & made
+            missing.append(len(own))
+            for value in own:
+                needed_by.setdefault(value, []).append(k)
+            if not own:
+                ready.setdefault(step[0], []).append(k)
+        while ready:
+            operation = max(ready, key=lambda each: len(ready[each]))
+            while operation in ready:  # what becomes ready meanwhile follows
+                for k in ready.pop(operation):
+                    found.append(some[k])
+                    for waiting in needed_by.get(some[k][1], ()) if operation != _WRITE else ():
+                        missing[waiting] -= 1
+                        if not missing[waiting]:
+                            ready.setdefault(some[waiting][0], []).append(waiting)
+    return found
+
+
+def _placed(steps: list[tuple[int, ...]], values: int, constants: Array) -> Program:
     """Give every value a slot, which is free again after the last step that needs it."""
-    end, constant, read, write = (
-        OPERATIONS.index(name) for name in ("end", "constant", "input", "output")
-    )
-    slot_of, free, slots = [0] * len(last), [], 0
+    last = [0] * values
+    for k, step in enumerate(steps):
+        for value in _operands(step):
+            last[value] = k
+        if step[0] != _WRITE:
+            last[step[1]] = k
+    slot_of, free, slots = [0] * values, [], 0
     rows: list[tuple[int, ...]] = []
     for k, (operation, goal, first, second) in enumerate(steps):
-        if operation == write:
-            rows.append((write, goal, slot_of[first], second))
+        if operation == _WRITE:
+            rows.append((_WRITE, goal, slot_of[first], second))
             if last[first] == k:
                 free.append(slot_of[first])
             continue
         row = (first, second)
-        if operation not in (constant, read):
+        if operation not in (_CONSTANT, _READ):
             row = (slot_of[first], slot_of[second])
             free += [slot_of[each] for each in {first, second} if last[each] == k]
         if not free:
@@ -116,7 +156,7 @@ def _placed(steps: list[tuple[int, ...]], last: list[int], constants: Array) -> 
         rows.append((operation, slot_of[goal], *row))
         if last[goal] == k:
             free.append(slot_of[goal])
-    rows.append((end, 0, 0, 0))
+    rows.append((_END, 0, 0, 0))
     return Program(np.array(rows, np.int32), constants, slots)
 
 

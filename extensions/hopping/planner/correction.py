@@ -19,6 +19,7 @@ from ....mathematics.banded_system import smallest_correction
 from ....mathematics.compiling.compile_calls import compile_calls
 from ....mathematics.compiling.kernel_call import KernelCall
 from ....planner.problem.problem import FullProblem
+from ....planner.solving.constraint_values import ConstraintValues
 from ....planner.solving.solver import VIOLATION
 
 STEPS = 8
@@ -57,17 +58,8 @@ class Corrector:
 
     def __init__(self, problem: FullProblem) -> None:
         assembly = problem.assembly
-        jacobian = assembly.jacobian()
-        pattern = jacobian.sparsity_out(1)
         rows, variables = assembly.constraints, assembly.variables
-        self._variables, self._parameters = np.zeros(variables), np.zeros(assembly.parameters)
-        self._rows, self._evaluated = np.zeros(rows), np.zeros(pattern.nnz())
-        self._values = self._evaluated.copy()
-        self._buffer, self._evaluate = jacobian.buffer()
-        for number, array in enumerate((self._variables, self._parameters)):
-            self._buffer.set_arg(number, array.data)
-        for number, array in enumerate((self._rows, self._evaluated)):
-            self._buffer.set_res(number, array.data)
+        self._variables, self._constraints = np.zeros(variables), ConstraintValues(assembly)
         self._place, self._count = np.zeros(rows, dtype=np.int64), np.zeros(1, dtype=np.int64)
         self._vector, self._step = np.zeros(rows), np.zeros(variables)
         self._factorised, self._found = np.zeros((2, 1), dtype=np.bool_)
@@ -75,8 +67,7 @@ class Corrector:
         self._inverse = self._squares.copy()
         self._call = KernelCall(
             smallest_correction,
-            np.array(pattern.colind(), dtype=np.int64), np.array(pattern.row(), dtype=np.int64),
-            self._values, self._inverse, self._place, self._count, REGULARISATION,
+            self._constraints.starts, self._constraints.rows, self._constraints.entries, self._inverse, self._place, self._count, REGULARISATION,
             np.zeros((rows, BAND)), *np.zeros((2, rows), dtype=np.int64), self._vector, self._step,
             self._factorised, self._found,
         )  # fmt: skip
@@ -87,16 +78,16 @@ class Corrector:
         held = problem.row_lower == problem.row_upper
         self._variables[:] = guess
         self._inverse[:] = self._squares
-        self._parameters[:] = problem.parameters
+        self._constraints.set_parameters(problem.parameters)
         limited, violation = np.empty_like(guess), np.inf
         for steps in range(STEPS + 1):
             np.clip(self._variables, problem.lower, problem.upper, out=limited)
             left = limited != self._variables
             self._inverse[left] = 0.0
             self._variables[:] = limited
-            self._evaluate()
-            before = violation
-            below, above = problem.row_lower - self._rows, self._rows - problem.row_upper
+            self._constraints.evaluate(self._variables)
+            before, values = violation, self._constraints.values
+            below, above = problem.row_lower - values, values - problem.row_upper
             violated = np.maximum(below, above)
             violation = float(violated.max())
             if not violation > ENOUGH or violation > LOST or steps == STEPS:
@@ -107,7 +98,7 @@ class Corrector:
             )
             held |= touched
             if not self._factorised[0]:
-                self._values[:] = self._evaluated
+                self._constraints.differentiate(self._variables)
             self._count[0] = held.sum()
             self._place[:] = np.where(held, np.cumsum(held) - 1, -1)
             self._vector[: self._count[0]] = np.where(below > above, below, -above)[held]

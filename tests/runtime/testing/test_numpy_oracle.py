@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from aloft import Block, Field, Input, Output, Signal, cross, kernel
-from aloft.mathematics.arrays import Array1D, Indices1D, Matrix3, Vector3
+from aloft.mathematics.arrays import Array1D, Indices0D, Indices1D, Matrix3, Vector3
 from aloft.mathematics.kernel import expand
 from aloft.runtime.testing.conformance import ConformanceError, check_block
 from aloft.runtime.testing.numpy_oracle import NotJudged, difference
@@ -53,6 +53,23 @@ def cancels(u: Vector3, y: Vector3) -> None:
 @kernel
 def jumps(u: Vector3, y: Vector3) -> None:
     y[0] = math.floor(u[0])
+
+
+class Counted(NamedTuple):
+    count: Indices0D
+    x: Vector3
+
+
+@kernel
+def counts(memory: Counted, y: Vector3) -> None:
+    memory.count[()] = memory.count[()] + 1
+    y[0] = memory.count * memory.x[0]
+
+
+@kernel
+def decides(u: Vector3, count: Indices1D, y: Vector3) -> None:
+    count[0] = math.floor(u[0])
+    y[0] = u[1] + u[2]
 
 
 def after(function: Any, *arguments: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
@@ -132,3 +149,22 @@ def test_a_block_is_checked_with_numpys_answer(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(turned, "__code__", not_turned.__code__)
     with pytest.raises(ConformanceError, match=r"turned makes .* where NumPy has"):
         check_block(block_of(turned), cases=["kernels"])
+
+
+def test_a_number_in_memory_of_its_own_is_read_like_an_array_too() -> None:
+    given = Counted(np.array(3), np.array([0.5, 1.0, 2.0])), np.zeros(3)
+    before, found = after(counts, *given)
+    assert found[0].count == 4
+    assert found[1][0] == 2.0
+    assert not difference(counts, before, found)
+    found[0].count[()] = 5
+    assert difference(counts, before, found)
+
+
+def test_at_a_threshold_only_what_is_numpys_is_judged() -> None:
+    given = np.array([2.0, 0.1, 0.2]), np.zeros(1, np.int64), np.zeros(3)
+    before, found = after(decides, *given)
+    assert not difference(decides, before, found)
+    found[1][0] = 1
+    with pytest.raises(NotJudged):
+        difference(decides, before, found)
