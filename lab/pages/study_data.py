@@ -111,7 +111,7 @@ def labels_of(folder: Path) -> list[str]:
 def kind_of_miss(reason: str) -> str:
     """Return why a run is no success, in a word or two."""
     kinds = {
-        "fell": "fell", "flight of": "flight too short", "rose": "rise", "jumped": "place", "turned": "turn",
+        "safety": "safety stop", "fell": "fell", "flight of": "flight too short", "rose": "rise", "jumped": "place", "turned": "turn",
         "tilt": "tilt", "torso": "tilt", "joint": "joint limit", "slid": "feet slid", "moved": "feet slid",
         "step": "stepped", "touch": "touched",
     }  # fmt: skip
