@@ -113,7 +113,7 @@ def kind_of_miss(reason: str) -> str:
     kinds = {
         "safety": "safety stop", "fell": "fell", "flight of": "flight too short", "rose": "rise", "jumped": "place", "turned": "turn",
         "tilt": "tilt", "torso": "tilt", "joint": "joint limit", "slid": "feet slid", "moved": "feet slid",
-        "step": "stepped", "touch": "touched",
+        "stepped": "stepped", "touched": "touched",
     }  # fmt: skip
     return next((kind for text, kind in kinds.items() if text in reason), "other")
 
