@@ -34,6 +34,9 @@ def main() -> None:
     gc.set_threshold(*COLLECTED_AFTER)
     # Else Pydantic looks through all installed packages for plugins, a tenth of a start.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    from .shared.dataclass_methods import make_when_called
+
+    make_when_called()
     from .app import main as run_command_line
 
     run_command_line()

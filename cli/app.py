@@ -29,9 +29,6 @@ IN_FILE_OF = {"doctor": "check"}
 GROUPS = ("robot",)
 """The groups of the core to which extensions may add verbs, declared as ``robot reach``."""
 
-ONLY_READ = ("check", "graph", "blocks")
-"""The verbs that leave nothing to be closed at the end of the process."""
-
 
 def make_app(verbs: Iterable[str] | None = None, inner: str = "") -> typer.Typer:
     """Make the command line with those verbs, or with all; the files of others are not imported.
@@ -149,9 +146,9 @@ def _options(
 
 def main() -> None:
     """Run the command line and leave with one of ``ExitCode``."""
-    if any(verb in ONLY_READ for verb in sys.argv[1:2]):
-        # At its end Python looks for garbage once more, which takes a quarter of the time of a check.
-        atexit.register(gc.freeze)
+    # At its end Python looks for garbage once more, which takes a quarter of the time of a run. What must be
+    # closed has been closed by then; registered first, this is called after all others.
+    atexit.register(gc.freeze)
     # typer exports only the most special of the errors that a wrong command line raises
     usage_error = cast("type[Exception]", typer.BadParameter.__bases__[0])
     try:

@@ -128,7 +128,7 @@ class DriveGains(Parameters):
         text="speed at which a robot that stands at the end sits down before it is damped; zero: not",
     )  # fmt: skip
     motor_model: MotorModel = parameter(
-        MotorModel(), text="differences of the motors from their nominal torque constants"
+        MotorModel, text="differences of the motors from their nominal torque constants"
     )
 
 

@@ -93,10 +93,11 @@ def tracked() -> dict[str, str]:
 def docstrings(path: str, text: str) -> list[Docstring]:
     """Find the docstrings of a file: of modules, classes and functions, and below assignments."""
     found = []
-    for node in ast.walk(ast.parse(text)):
-        body = getattr(node, "body", None)
-        if not isinstance(body, list):
-            continue
+    nodes: list[ast.AST] = [ast.parse(text)]
+    for node in nodes:  # a list that grows by the statements in each
+        for field in ("body", "handlers", "orelse", "finalbody", "cases"):
+            nodes += getattr(node, field, ())
+        body: list[ast.stmt] = getattr(node, "body", [])
         for before, statement in zip((None, *body), body, strict=False):
             if not isinstance(statement, ast.Expr) or not isinstance(statement.value, ast.Constant):
                 continue

@@ -127,27 +127,29 @@ def tracked() -> Mapping[str, str]:
     return {path: (ROOT / path).read_text(encoding="utf-8") for path in sorted(paths)}
 
 
-def defined(path: str, text: str) -> Iterator[Name]:
-    """Yield the names of the classes, functions, parameters and variables that a file defines."""
+def defined(path: str, text: str) -> list[Name]:
+    """Find the names of the classes, functions, parameters and variables that a file defines."""
+    found = []
 
-    def visit(node: ast.AST, function: str) -> Iterator[Name]:
+    def visit(node: ast.AST, function: str) -> None:
         match node:
             case ast.ClassDef(name=name, lineno=line):
-                yield Name(name, path, line, function, True)
+                found.append(Name(name, path, line, function, True))
             case (
                 ast.FunctionDef(name=name, lineno=line)
                 | ast.AsyncFunctionDef(name=name, lineno=line)
             ):
-                yield Name(name, path, line, function, False)
+                found.append(Name(name, path, line, function, False))
                 function = name
             case ast.arg(arg=name, lineno=line):
-                yield Name(name, path, line, function, False)
+                found.append(Name(name, path, line, function, False))
             case ast.Name(id=name, ctx=ast.Store(), lineno=line):
-                yield Name(name, path, line, function, False)
+                found.append(Name(name, path, line, function, False))
         for child in ast.iter_child_nodes(node):
-            yield from visit(child, function)
+            visit(child, function)
 
-    yield from visit(ast.parse(text), "")
+    visit(ast.parse(text), "")
+    return found
 
 
 def misleading(names: list[Name]) -> Iterator[Name]:

@@ -58,9 +58,9 @@ def expand(function: Any) -> None:
     if id(function) not in _expanded and is_kernel(function) and function.__closure__ is None:
         code = written_code(function)
         if not _takes_numbers_only(function):
-            from .compiling.equations import expanded_code
+            from .compiling.kept_expansions import kept_expansion
 
-            code = expanded_code(function, code)
+            code = kept_expansion(function, code)
         function.__code__ = code
         _expanded.add(id(function))
 

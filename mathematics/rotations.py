@@ -334,8 +334,8 @@ def to_euler(quaternion: Array1D, out: Array1D) -> None:
 
 def axis_rotations(axis: Sequence[float], angles: Array) -> Array:
     """Rotation matrices (n, 3, 3) about a unit axis by ``angles`` [rad] (n,), all at once."""
-    cross = np.empty((3, 3))
-    skew(np.array(axis), cross)
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sine, cosine = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
     rotations: Array = np.eye(3) + sine * cross + (1.0 - cosine) * product(cross, cross)
     return rotations

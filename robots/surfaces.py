@@ -16,7 +16,6 @@ import numpy as np
 from ..mathematics.arrays import Array, Indices
 from ..mathematics.rotations import matrices_of_quaternions
 from .element import Vector3
-from .importing.meshes import mesh_triangles, simplified
 from .importing.package_files import find_file
 from .robot_description import Appearance, Box, Mesh, RobotDescription, TurnedShape
 
@@ -89,6 +88,8 @@ def _meshes(
 ) -> Iterator[Surface]:
     """Yield the meshes of a link. Raises ``OSError`` or ``ValueError`` with the sentence for the user."""
     for mesh in look.meshes:
+        from .importing.meshes import mesh_triangles, simplified  # which read XML
+
         path = _path(mesh)
         if path is None:
             raise ValueError(_absent(link, mesh))

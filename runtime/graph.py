@@ -62,6 +62,7 @@ class Graph:
         clock: ClockSpec | None = None,
         sinks: Sequence[Sink] = (),
         log: bool = True,
+        run_hash: bool = True,
         plain: bool = False,
         fuse: bool = True,
         real_time: RealTimeOptions = NO_REAL_TIME,
@@ -74,6 +75,7 @@ class Graph:
             clock: how to pace it; by default that of the graph.
             sinks: what else records the run.
             log: whether to keep every signal of every tick.
+            run_hash: whether to hash every tick; a long log of a robot runs twice as fast without.
             plain: whether to run all kernels as plain Python: slower, with the same bytes.
             fuse: whether blocks of kernels that follow each other are one compiled call.
             real_time: what the control thread requests from the operating system while it ticks.
@@ -97,6 +99,7 @@ class Graph:
             clock=clock,
             sinks=sinks,
             log=log,
+            run_hash=run_hash,
             plain=plain,
             fuse=fuse,
             real_time=real_time,

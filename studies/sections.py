@@ -242,7 +242,7 @@ def _spaced(entry: Entry, node: MapNode, problems: Problems) -> list[Node] | Non
 
 
 GOAL_KEYS = ("rate", "where")
-TUNE_KEYS = ("seeds", "draws", "seed", "ranges", "where", "set", "least")
+TUNE_KEYS = ("seeds", "draws", "seed", "ranges", "where", "set", "least", "race")
 FALSIFY_KEYS = ("seeds", "draws", "seed", "ranges", "where", "set", "margin", "smallest")
 PLOT_KEYS = {
     "polar": ("kind", "title", "angle", "radius", "level", "lines", "where"),
@@ -405,9 +405,13 @@ def read_tuning(node: MapNode, labels: Labels, problems: Problems) -> Tuning | N
                 found=listing(map(str, kept)),
                 fix="seeds: 0:4",
             )
+    race = node.get("race")
+    races = plain(race.value) if race else False
+    if not isinstance(races, bool):
+        wrong_kind(race.value, "'race'", "true or false", problems)
     return Tuning(
         search.seeds, search.draws, search.seed, search.cells, search.sets,
-        str(plain(least_of.value)) if least_of else "",
+        str(plain(least_of.value)) if least_of else "", races is True,
     )  # fmt: skip
 
 

@@ -107,6 +107,8 @@ class Tuning:
     sets: tuple[Entry, ...] = ()
     least: str = ""
     """Between draws of the same number of successes, the one whose mean of this metric is less."""
+    race: bool = False
+    """Whether draws that can no longer win are stopped."""
 
 
 @dataclass(frozen=True)

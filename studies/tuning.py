@@ -19,6 +19,9 @@ The number of draws that are proposed at once is fixed, and the sampler is seede
 another arm. So a search that was stopped goes on where it was, because it proposes the same again
 and finds those runs in its journal.
 
+With ``race`` the runs of a draw are made one by one, every cell with the first seed, then with the next, and a draw that
+has failed more often than the best one before it is stopped, as it can no longer win. The sampler is told its rate of failures.
+
 The result is a file beside the study's file, from which the study's runs take the parameters. It
 holds a hash of what was searched: a study that was changed since has to be tuned again.
 """
@@ -142,6 +145,8 @@ class Draw:
     successes: int = 0
     least: float = math.nan
     """The mean of the metric that should be least; NaN where no run has it, or none is named."""
+    stopped: bool = False
+    """Whether runs of it were left out, because it could no longer win."""
 
 
 def tuning_cells(study: Study) -> list[Cell]:
@@ -205,6 +210,7 @@ def definition(study: Study) -> str:
     assert study.tuning is not None
     tuning = study.tuning
     searched: list[Any] = [list(tuning.seeds), tuning.draws, tuning.seed, tuning.least]
+    searched += ["race"] if tuning.race else []
     searched += [path.name for path in study.include]
     searched += [[arm.name, path.name] for arm in study.arms for path in arm.include]
     searched += [[c.task, c.graph.name, c.arm, c.overrides] for c in tuning_cells(study)]
@@ -216,8 +222,8 @@ def definition(study: Study) -> str:
     return hashlib.sha256(text_of(searched).encode()).hexdigest()[:16]
 
 
-def write_tuned(study: Study, best: Mapping[str, Draw]) -> Path:
-    """Write the best parameters of every arm. Raises ``AloftError``."""
+def write_tuned(study: Study, best: Mapping[str, Draw], stopped: Mapping[str, int]) -> Path:
+    """Write the best parameters of every arm, and how many of its draws were stopped. Raises ``AloftError``."""
     assert study.tuning is not None
     tuning = study.tuning
     lines = [
@@ -229,6 +235,8 @@ def write_tuned(study: Study, best: Mapping[str, Draw]) -> Path:
     ]
     for arm, found in best.items():
         score = f"draw: {found.number}, successes: {found.successes}, n: {found.n}"
+        if tuning.race:
+            score += f", stopped: {stopped.get(arm, 0)}"
         lines.append(f"  {text_of(arm)}: {{{score}, set: {text_of(dict(found.values))}}}")
     path = tuned_path(study)
     partial = path.with_name(f".{path.name}.partial")
@@ -282,13 +290,19 @@ def runs_of_search(study: Study, chosen: Sequence[Cell]) -> int:
     return sum(draws[cell.arm] for cell in chosen) * len(study.tuning.seeds)
 
 
-def search(study: Study, chosen: Sequence[Cell], make: Make) -> dict[str, Draw]:
+def search(
+    study: Study,
+    chosen: Sequence[Cell],
+    make: Make,
+    on_draw: Callable[[str, Draw], None] = lambda arm, found: None,
+) -> dict[str, Draw]:
     """Search for the best draw of every arm.
 
     Args:
         study: the study, with a section ``tune``.
         chosen: its cells for tuning, checked.
         make: makes the runs of some draws of all arms.
+        on_draw: called with the arm and each of its draws once its runs are made.
 
     Raises:
         AloftError: Optuna is not installed.
@@ -319,23 +333,48 @@ def search(study: Study, chosen: Sequence[Cell], make: Make) -> dict[str, Draw]:
             )
             for name, each, _ in asked
         ]
-        done = make([run for runs in planned for run in runs])
-        at = 0
-        for (name, each, trial), runs in zip(asked, planned, strict=True):
-            found = scored(each, done[at : at + len(runs)], tuning.least)
-            at += len(runs)
-            if trial is not None:
-                samplers[name].tell(trial, value_to_minimise(found, len(runs)))
+        allowed = [
+            len(runs) - best[name].successes if tuning.race and name in best else len(runs)
+            for (name, _, _), runs in zip(asked, planned, strict=True)
+        ]
+        made = (
+            made_in_rounds(planned, allowed, make) if tuning.race else made_at_once(planned, make)
+        )
+        for (name, each, drawn), runs, done in zip(asked, planned, made, strict=True):
+            found = replace(scored(each, done, tuning.least), stopped=len(done) < len(runs))
+            on_draw(name, found)
+            if drawn is not None:
+                samplers[name].tell(drawn, value_to_minimise(found, len(runs)))
             if name not in best or order(found) < order(best[name]):
                 best[name] = found
     return best
 
 
+def made_at_once(planned: Sequence[Sequence[Run]], make: Make) -> list[list[Run]]:
+    """Make the runs of some draws, all of them together."""
+    done = iter(make([run for runs in planned for run in runs]))
+    return [[next(done) for _ in runs] for runs in planned]
+
+
+def made_in_rounds(
+    planned: Sequence[Sequence[Run]], allowed: Sequence[int], make: Make
+) -> list[list[Run]]:
+    """Make the runs of some draws, one of every draw at a time, of each as long as no more of them failed than ``allowed``."""
+    left = [sorted(runs, key=lambda run: run.seed) for runs in planned]
+    done: list[list[Run]] = [[] for _ in planned]
+    failures = [0] * len(planned)
+    while live := [i for i, runs in enumerate(left) if runs and failures[i] <= allowed[i]]:
+        for i, run in zip(live, make([left[i].pop(0) for i in live]), strict=True):
+            done[i].append(run)
+            failures[i] += not (run.outcome and run.outcome.success)
+    return done
+
+
 def value_to_minimise(found: Draw, runs: int) -> float:
-    """Compute one number that orders draws as ``order`` does: failures first, then the metric, in
-    (0, 1)."""
+    """Compute one number that orders draws as ``order`` does: failures, those of a stopped draw by their rate, then the
+    metric, in (0, 1)."""
     share = 1.0 if math.isnan(found.least) else 0.5 + math.atan(found.least) / math.pi
-    return runs - found.successes + share
+    return (found.n - found.successes) * runs / found.n + share if found.n else runs + share
 
 
 def proposed(each: Range, trial: Trial) -> Any:

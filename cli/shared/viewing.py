@@ -29,7 +29,7 @@ def draw(recording: Path, layout: Path | None, path: Path) -> Path:
     """
     from ...logs.file.records import NoRunError
     from ...logs.recording.drawn_run import write_view
-    from ...logs.viewing.blueprint import blueprint_with, layout_beside, read_layout
+    from ...logs.viewing.own_layout import blueprint_with, layout_beside, read_layout
     from ...robots.surfaces import missing_meshes
 
     try:

@@ -263,14 +263,10 @@ class Hardware(Parameters):
     robot: str = parameter(..., text="the robot's name in its description")
     bus: BusSettings = parameter(..., text="the bus of the drives")
     board: BoardSettings = parameter(..., text="the sensor board")
-    drives: DriveSettings = parameter(
-        DriveSettings(), text="settings that all drives have in common"
-    )
+    drives: DriveSettings = parameter(DriveSettings, text="settings that all drives have in common")
     motors: dict[str, MotorSettings] = parameter(..., text="every motor, by its name")
-    soft_start: SoftStart = parameter(SoftStart(), text="way of the drives to the standing pose")
-    dead_man: DeadMan = parameter(
-        DeadMan(), text="switch that must be held while the drives are on"
-    )
+    soft_start: SoftStart = parameter(SoftStart, text="way of the drives to the standing pose")
+    dead_man: DeadMan = parameter(DeadMan, text="switch that must be held while the drives are on")
 
     @classmethod
     def read(cls, file: Path, robot: RobotDescription | None = None) -> Hardware:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from ...mathematics.arrays import Array, Array1D, Flags
+from ...mathematics.arrays import Array, Array1D, Array2D, Flags, Indices1D
+from ...mathematics.kernel import kernel
 from ...runtime.language.errors import UnitError
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.units import parse_unit
@@ -66,7 +68,11 @@ def numbers(
     lengths = {len(each.values) for each in found}
     if len(lengths) > 1:
         raise LogError(f"the columns {', '.join(names)} have different lengths: {sorted(lengths)}")
-    values = np.concatenate([each.values for each in found], axis=1)
+    values = (
+        found[0].values
+        if len(found) == 1
+        else np.concatenate([each.values for each in found], axis=1)
+    )
     if count is not None and values.shape[1] != count:
         raise LogError(f"{', '.join(names)} has {values.shape[1]} columns, expected {count}")
     width = values.shape[1]
@@ -80,7 +86,8 @@ def numbers(
         for name, each in zip(names, found, strict=True)
         for _ in range(each.values.shape[1])
     ]
-    values = (values - np.array(spec.offset)) * np.array(spec.scale) * np.array(factors)
+    if any(spec.offset) or {*spec.scale, *factors} != {1.0}:
+        values = (values - np.array(spec.offset)) * np.array(spec.scale) * np.array(factors)
     return values, found[0].stamps
 
 
@@ -139,11 +146,59 @@ def jitter_of(log: LogFile, clock: LogClock, rows: int, own: Array1D | None) -> 
     return float(steps.std() / steps.mean()) if steps.size and steps.mean() > 0.0 else 0.0
 
 
+class TimedRows(NamedTuple):
+    """Rows with their times, of which a tick takes those about its own time: ``values`` (n, k) at ``stamps`` (n,) [s].
+
+    ``column`` (j,) is that of each number that is wanted, -1 where there is none and it stays ``otherwise`` (j,). ``times`` (m,) [s]
+    are the ticks', ``last`` (m,) the row at or before each. ``linear`` (1,) is true between rows, false where the last row holds.
+    """
+
+    stamps: Array1D
+    values: Array2D
+    column: Indices1D
+    otherwise: Array1D
+    times: Array1D
+    last: Indices1D
+    linear: Flags
+
+    def at_ticks(self) -> Array:
+        """Return what every tick takes, (m, j)."""
+        rows = np.tile(self.otherwise, (len(self.times), 1))
+        own = self.column >= 0
+        at = at_times(self.stamps, self.values, self.times, not self.linear[0])
+        rows[:, own] = at[:, self.column[own]]
+        return rows
+
+
+def last_rows(stamps: Array1D, times: Array1D, hold: bool = False) -> Indices1D:
+    """Return the row at or before each time (m,), the first one before all stamps; where it holds, a stamp may be 1 ns late."""
+    late = 1e-9 if hold else 0.0
+    found = np.searchsorted(stamps, times + late, side="right") - 1
+    return np.clip(found, 0, len(stamps) - 1)
+
+
+@kernel
+def take_row(rows: TimedRows, tick: int, out: Array1D) -> None:
+    """Write the numbers (j,) of a tick, with the bytes of ``at_times``."""
+    last = rows.last[tick]
+    since = rows.times[tick] - rows.stamps[last]
+    between = rows.linear[0] and last + 1 < rows.stamps.shape[0] and since > 0.0
+    span = rows.stamps[last + 1] - rows.stamps[last] if between else 1.0
+    for j in range(out.shape[0]):
+        column = rows.column[j]
+        if column < 0:
+            out[j] = rows.otherwise[j]
+        elif between:
+            here = rows.values[last, column]
+            out[j] = (rows.values[last + 1, column] - here) / span * since + here
+        else:
+            out[j] = rows.values[last, column]
+
+
 def at_times(stamps: Array1D, values: Array, times: Array1D, hold: bool = False) -> Array:
     """Return rows (m, k) at other times (m,): linear between rows, or that of the last row before."""
     if hold:
-        last = np.clip(np.searchsorted(stamps, times + 1e-9, side="right") - 1, 0, len(stamps) - 1)
-        return values[last]
+        return values[last_rows(stamps, times, hold)]
     return np.stack([np.interp(times, stamps, column) for column in values.T], axis=1)
 
 

@@ -24,6 +24,7 @@ from ...robots.description import RobotDescription
 from ...runtime.language.block import Clock, Context, Input, Metric, Output, UnmetRequirement
 from ...runtime.language.parameters import Parameters
 from ..robot import Robot
+from .columns import take_row
 from .log_file import LogError, LogFile, read_log
 from .parameters import LogParameters
 from .played_log import PlayedLog, PlayedRows, play
@@ -109,6 +110,9 @@ class LogRobot(Robot):
         self.rows = self.played.rows
         self.last_tick = len(self.rows.imu) - 1
         self.period_ticks = self.context.period_ticks
+        # what a log does not tell stays zero from here on
+        self.health.state = DrivePhase.DRIVING
+        self.health.condition[:] = HEALTHY
 
     @kernel
     @staticmethod
@@ -127,43 +131,23 @@ class LogRobot(Robot):
         i = min(tick, last_tick)
         imu.angular_velocity[:] = rows.imu[i, 0:3]
         imu.specific_force[:] = rows.imu[i, 3:6]
-        joints.position[:] = rows.position[i]
-        joints.velocity[:] = rows.velocity[i]
-        joints.torque[:] = rows.torque[i]
+        take_row(rows.position, i, joints.position)
+        take_row(rows.velocity, i, joints.velocity)
+        take_row(rows.torque, i, joints.torque)
         for point in range(rows.closed.shape[1]):
             contacts.closed[point] = rows.closed[i, point]
             truth.contact_touched[point] = rows.closed[i, point]
-        health.state = DrivePhase.DRIVING
-        health.condition[:] = HEALTHY
-        health.voltage[:] = 0.0
-        health.temperature[:] = 0.0
-        health.current[:] = 0.0
-        health.age[:] = 0.0
-        health.late_cycles = 0
-        health.lost_answers = 0
         health.stamp = clock.base_period * clock.tick
         health.contacts_valid = True
         health.imu_valid = rows.imu_valid[i]
         health.joints_valid = rows.joints_valid[i]
         health.imu_age = rows.imu_age[i]
-        truth.com[:] = 0.0
-        truth.com_velocity[:] = 0.0
-        truth.angular_momentum[:] = 0.0
-        truth.contact_position[:] = 0.0
-        truth.contact_force[:] = 0.0
-        truth.ground_height[:] = 0.0
-        truth.forbidden_contacts = 0
-        truth.joint_limit_violation = 0.0
-        truth.motor_torque[:] = 0.0
-        truth.motor_speed[:] = 0.0
-        truth.motor_overload = 0.0
-        truth.saturated_share = 0.0
         truth.base_position[:] = rows.pose[i, 0:3]
         truth.base_orientation[:] = rows.pose[i, 3:7]
         truth.base_linear_velocity[:] = rows.twist[i, 0:3]
         truth.base_angular_velocity[:] = rows.twist[i, 3:6]
-        truth.joint_position[:] = rows.position[i]
-        truth.joint_velocity[:] = rows.velocity[i]
+        truth.joint_position[:] = joints.position
+        truth.joint_velocity[:] = joints.velocity
 
     @kernel
     @staticmethod

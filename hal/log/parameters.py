@@ -70,7 +70,7 @@ class LogParameters(Parameters):
     """The parameters of ``LogRobot``."""
 
     file: str = parameter(text="the log, relative to the graph's folder; a folder is a ROS 2 bag")
-    clock: LogClock = parameter(LogClock(), text="when rows were taken")
+    clock: LogClock = parameter(LogClock, text="when rows were taken")
     imu: LogImu | None = parameter(None, text="the IMU")
     joints: LogJoints | None = parameter(None, text="the joints; none: they stand")
     contacts: dict[str, LogContact] = parameter({}, text="by the name of a foot")

@@ -14,8 +14,10 @@ from ...mathematics.arrays import Array, Array1D, Array2D, Flags, Flags1D, Flags
 from ...robots.description import RobotDescription
 from .columns import (
     MOST_JITTER,
+    TimedRows,
     at_times,
     jitter_of,
+    last_rows,
     match_joints,
     mean_over,
     numbers,
@@ -34,13 +36,13 @@ GAP = 5.0
 
 
 class PlayedRows(NamedTuple):
-    """Values that every tick plays, n rows: IMU (n, 6), joints (n, n_joints), switches (n, n_contacts), pose of the base
-    (n, 7) with its quaternion x, y, z, w, and its twist (n, 6)."""
+    """Values that every tick plays, n rows: IMU (n, 6), switches (n, n_contacts), pose of the base (n, 7) with its quaternion
+    x, y, z, w, and its twist (n, 6). Those of the joints, most of a log, stay in its own rows."""
 
     imu: Array2D
-    position: Array2D
-    velocity: Array2D
-    torque: Array2D
+    position: TimedRows
+    velocity: TimedRows
+    torque: TimedRows
     closed: Flags2D
     imu_valid: Flags1D
     joints_valid: Flags1D
@@ -130,6 +132,20 @@ class _Player:
             return mean_over(series.stamps, series.values, self.times, self.period)
         return at_times(series.stamps, series.values, self.times, hold or between == "hold")
 
+    def joint_rows(
+        self, series: _Series | None, columns: Sequence[int], otherwise: Array1D
+    ) -> TimedRows:
+        """Return the rows of a series of joints; ``otherwise`` (n_joints,) where it has no column."""
+        own, linear = np.array(columns, np.int64), self.params.between == "linear"
+        if series is None:
+            series, own = _Series(self.times[:1], np.zeros((1, 1))), np.full(len(own), -1)
+        elif self.params.between == "mean":
+            series = _Series(self.times, self.on_ticks(series))
+        return TimedRows(
+            series.stamps, np.ascontiguousarray(series.values), own, otherwise, self.times,
+            last_rows(series.stamps, self.times, hold=not linear), np.array([linear]),
+        )  # fmt: skip
+
 
 def play(log: LogFile, params: LogParameters, robot: RobotDescription, period: float) -> PlayedLog:
     """Return what a log plays at the ticks of a ``period`` [s]; with problems it has no rows."""
@@ -180,10 +196,10 @@ def play(log: LogFile, params: LogParameters, robot: RobotDescription, period: f
     played.gaps = int((steps > GAP * np.median(steps)).sum())
     played.rows = _rows(player, gyro, force, mounting, columns, joints, contacts, place, turn)
     if commanded is not None:
-        played.commanded = np.zeros_like(played.rows.torque)
-        own = [k for k, column in enumerate(columns) if column >= 0]
-        at = at_times(commanded.stamps, commanded.values, player.times, True)
-        played.commanded[:, own] = at[:, [columns[k] for k in own]]
+        rows = player.joint_rows(commanded, columns, np.zeros(len(columns)))
+        played.commanded = rows._replace(
+            last=last_rows(commanded.stamps, player.times, hold=True), linear=np.array([False])
+        ).at_ticks()
     _warn(player, names, columns)
     return played
 
@@ -354,30 +370,27 @@ def _rows(
         played.imu_repeats = float(repeated.mean())
         imu_valid, age = _validity(player, gyro.stamps, repeated)
     angles, speeds, torques = joints
-    position = np.tile(np.array(robot.standing_position, np.float64), (count, 1))
-    velocity, torque = np.zeros_like(position), np.zeros_like(position)
+    if angles is not None and speeds is None:
+        speeds = _Series(angles.stamps, np.gradient(angles.values, angles.stamps, axis=0))
     joints_valid = np.ones(count, bool)
-    own = [k for k, column in enumerate(columns) if column >= 0]
-    taken = [columns[k] for k in own]
-    if angles is not None and own:
-        position[:, own] = player.on_ticks(angles)[:, taken]
-        if speeds is None:
-            speeds = _Series(angles.stamps, np.gradient(angles.values, angles.stamps, axis=0))
-        velocity[:, own] = player.on_ticks(speeds)[:, taken]
-        if torques is not None:
-            torque[:, own] = player.on_ticks(torques)[:, taken]
-        moving = np.abs(speeds.values).max(axis=1) > 0.0
-        repeated = repeats_of(angles.values) & moving
+    if angles is not None and speeds is not None and max(columns, default=-1) >= 0:
+        repeated = repeats_of(angles.values)
+        repeated[repeated] = at_times(speeds.stamps, speeds.values, angles.stamps[repeated]).any(
+            axis=1
+        )
         played.joint_repeats = float(repeated.mean())
         joints_valid, _ = _validity(player, angles.stamps, repeated)
+    still = np.zeros(len(columns))
+    standing = np.array(robot.standing_position, np.float64)
     closed = np.zeros((count, len(robot.contacts)), bool)
     foot = np.asarray(robot.foot_of_contact(), np.int64)
     for index, flags in contacts.items():
         closed[:, foot == index] = player.on_ticks(flags, hold=True) > 0.5
     pose, twist = _motion(player, place, turn)
     return PlayedRows(
-        imu, position, velocity, torque, closed, imu_valid, joints_valid, age, pose, twist
-    )
+        imu, player.joint_rows(angles, columns, standing), player.joint_rows(speeds, columns, still),
+        player.joint_rows(torques, columns, still), closed, imu_valid, joints_valid, age, pose, twist,
+    )  # fmt: skip
 
 
 def _validity(player: _Player, stamps: Array1D, repeated: Flags) -> tuple[Flags, Array1D]:

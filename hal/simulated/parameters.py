@@ -140,7 +140,7 @@ class BodyParameters(Parameters):
         [0.0, 0.0, 0.0], unit="m", min_length=3, max_length=3, text="offset of the torso's CoM"
     )
     base_com_spread: float = parameter(0.0, unit="m", ge=0, text="spread of the offset, per axis")
-    links: LinkEffects = parameter(LinkEffects(), text="how the links differ from the description")
+    links: LinkEffects = parameter(LinkEffects, text="how the links differ from the description")
     cable: CableParameters | None = parameter(None, text="a cable that pulls at the base")
 
 
@@ -180,10 +180,10 @@ class SensorParameters(Parameters):
         text="factor on noise and bias of the sensors that the robot's description mounts; 0: they "
         "have no errors",
     )  # fmt: skip
-    imu: ImuEffects = parameter(ImuEffects(), text="the IMU: place, mount, filter, delay")
-    encoders: EncoderEffects = parameter(EncoderEffects(), text="the joint encoders")
+    imu: ImuEffects = parameter(ImuEffects, text="the IMU: place, mount, filter, delay")
+    encoders: EncoderEffects = parameter(EncoderEffects, text="the joint encoders")
     switches: SwitchEffects = parameter(
-        SwitchEffects(), text="the foot switches, besides `switch_threshold` and bounce"
+        SwitchEffects, text="the foot switches, besides `switch_threshold` and bounce"
     )
 
     @model_validator(mode="after")
@@ -212,9 +212,9 @@ class ActuatorParameters(Parameters):
         0.0, ge=0, lt=1, text="spread of a factor on thrust and moment of every thruster"
     )
     joints: JointEffects = parameter(
-        JointEffects(), text="how joints and rotors differ from the description"
+        JointEffects, text="how joints and rotors differ from the description"
     )
-    motors: MotorEffects = parameter(MotorEffects(), text="the motors and their current loops")
+    motors: MotorEffects = parameter(MotorEffects, text="the motors and their current loops")
     gears: GearParameters | None = parameter(
         None,
         text="gears that yield, with encoders on the rotors; none: rotor and joint are one body",
@@ -252,14 +252,14 @@ class SimulatorParameters(DriveGains, WorldParameters):
         le=0.1,
         text="additional latency of a command, uniform from zero to this",
     )
-    start: StartParameters = parameter(StartParameters(), text="how a run begins")
-    ground: GroundParameters = parameter(GroundParameters(), text="the ground and its contacts")
+    start: StartParameters = parameter(StartParameters, text="how a run begins")
+    ground: GroundParameters = parameter(GroundParameters, text="the ground and its contacts")
     body: BodyParameters = parameter(
-        BodyParameters(), text="how the bodies differ from the description"
+        BodyParameters, text="how the bodies differ from the description"
     )
-    sensors: SensorParameters = parameter(SensorParameters(), text="the errors of the sensors")
+    sensors: SensorParameters = parameter(SensorParameters, text="the errors of the sensors")
     actuators: ActuatorParameters = parameter(
-        ActuatorParameters(), text="drives, motors, gears, and what feeds them"
+        ActuatorParameters, text="drives, motors, gears, and what feeds them"
     )
 
     @property

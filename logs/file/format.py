@@ -40,7 +40,7 @@ from __future__ import annotations
 import json
 from base64 import b64decode, b64encode
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, fields
 from hashlib import blake2b
 from math import prod
 from typing import Any, Self
@@ -232,13 +232,10 @@ class Header:
 
     def to_json(self) -> str:
         """Write the header as JSON text."""
-        plain = replace(
-            self, robot=None, bus_start=b""
-        )  # which asdict would copy, every mesh of it
-        data = asdict(plain) | {"schema_hashes": self.schema_hashes}
+        data = _plain(self) | {"schema_hashes": self.schema_hashes}
         data["robot"] = self.robot and self.robot.model_dump(mode="json", context={"looks": True})
         data["bus_start"] = b64encode(self.bus_start).decode()
-        return json.dumps(data)
+        return json.dumps(data, default=_plain)
 
     @classmethod
     def from_json(cls, text: str) -> Self:
@@ -254,6 +251,13 @@ class Header:
         data["order"] = tuple(data["order"])
         data["terrain"] = _terrain(data["terrain"])
         return cls(**data)
+
+
+def _plain(value: Any) -> dict[str, Any]:
+    """Return the values of a dataclass or of a mapping, which are not copied."""
+    if isinstance(value, Mapping):
+        return dict(value)
+    return {each.name: getattr(value, each.name) for each in fields(value)}
 
 
 def _terrain(data: Mapping[str, Any] | None) -> Terrain | None:

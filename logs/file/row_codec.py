@@ -42,22 +42,23 @@ def pack(first: int, rows: NDArray[np.uint8]) -> bytes:
     import pyarrow as pa  # comes with Rerun
 
     count, size = rows.shape
-    words = np.zeros((count, -(-size // 8) * 8), np.uint8)
-    words[:, :size] = rows
+    rows = np.ascontiguousarray(rows)
+    words = rows if size % 8 == 0 else np.pad(rows, ((0, 0), (0, -size % 8)))
     whole = words.view(np.int64)
     changing = (whole != whole[:1]).any(axis=0)
     columns = np.ascontiguousarray(whole[:, changing].T)
     for _ in range(ORDER):
-        columns[:, 1:] = np.diff(columns, axis=1)
-    zigzag = (columns << 1) ^ (columns >> 63)
-    parts = (
-        np.packbits(changing).tobytes(),
-        whole[0, ~changing].tobytes(),
-        zigzag.view(np.uint8).reshape(len(columns), count, 8).transpose(2, 0, 1).tobytes(),
-    )
-    flat = b"".join(parts)
+        columns[:, 1:] -= columns[:, :-1]
+    signs = columns >> 63
+    columns <<= 1
+    columns ^= signs
+    start = np.concatenate([np.packbits(changing), whole[0, ~changing].view(np.uint8)])
+    flat = np.empty(len(start) + columns.nbytes, np.uint8)
+    flat[: len(start)] = start
+    planes = flat[len(start) :].reshape(8, len(columns), count)
+    planes[:] = columns.view(np.uint8).reshape(len(columns), count, 8).transpose(2, 0, 1)
     packed: bytes = pa.Codec("zstd", compression_level=LEVEL).compress(flat, asbytes=True)
-    head = _HEAD.pack(_MARK, count, size, first, crc32(rows.tobytes()))
+    head = _HEAD.pack(_MARK, count, size, first, crc32(rows.data))
     return head + _SIZES.pack(len(columns), len(flat)) + packed
 
 

@@ -19,7 +19,6 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +33,7 @@ from ..file.format import Header
 from ..file.held_fields import split_bus
 from .output_file import OutputFile, cause_of, reserve_output, split_name
 from .recorder_protocol import KEYFRAME, NOTE, PART, REWIND, ROW, RecorderReport, RecorderTask
+from .rerun_import import import_rerun
 from .ring import Record, RingReader
 from .writer import RecordingWriter
 
@@ -46,7 +46,7 @@ LIVE_PERIOD = 0.1
 """Seconds after which a viewer is shown what has come."""
 LAST_SYNC = 2.0
 """Seconds that the end waits for the disk."""
-BATCH, BATCH_BYTES = 1024, 1 << 24
+BATCH, BATCH_BYTES = 512, 1 << 24
 """Ticks written at once, and their bytes, at most."""
 SLOW_FLUSH = 4.0
 """Number of flush periods for which ticks may wait that are fewer than those of one period of the
@@ -377,19 +377,20 @@ def _memory() -> int:
     return most if sys.platform == "darwin" else most * 1024
 
 
-class _NoPandas:
-    """Finds for Python that there is no pandas."""
+class _NotInstalled:
+    """Finds for Python that packages of some names are not there."""
 
     def find_spec(self, name: str, *_: Any) -> None:
-        """Raise ``ModuleNotFoundError`` for pandas; all else is for other finders."""
-        if name == "pandas":
+        """Raise ``ModuleNotFoundError`` for these packages; all else is for other finders."""
+        if name in ("pandas", "dateutil"):
             raise ModuleNotFoundError(name)
 
 
 def block_pandas_import() -> None:
-    """Let imports of pandas fail in this process. Arrow would import it where it is installed, only to see that no
-    value here comes from it, which takes longer than all else that this process does for a short run."""
-    sys.meta_path.insert(0, _NoPandas())
+    """Let imports of pandas fail in this process, and of what comes with it. Arrow would import them where they are
+    installed, only to see that no value here comes from them, which takes longer than all else that this process
+    does for a short run."""
+    sys.meta_path.insert(0, _NotInstalled())
 
 
 def main(tasks: str) -> None:
@@ -398,7 +399,7 @@ def main(tasks: str) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     block_pandas_import()
-    import_module("rerun")  # which takes longest, and is needed first when there is a task
+    import_rerun()  # which takes longest, and is needed first when there is a task
     with socket.socket(fileno=int(tasks)) as source_of_tasks:
         task, descriptors, _, _ = socket.recv_fds(source_of_tasks, 1 << 16, 2)
     if not task:

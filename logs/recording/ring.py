@@ -23,6 +23,8 @@ from dataclasses import dataclass
 from struct import Struct
 from threading import Lock
 
+import numpy as np
+
 try:
     import resource
 except ImportError:  # on Windows, which limits no sizes
@@ -99,7 +101,9 @@ class RingWriter(_Ring):
 
     def __init__(self, descriptor: int, capacity: int) -> None:
         super().__init__(descriptor, capacity)
-        self._bytes[:] = bytes(capacity)  # touch every page now, not while the robot moves
+        pages = np.frombuffer(self._bytes, np.uint8)[:: mmap.PAGESIZE]
+        pages[:] = 0  # touch every page now, not while the robot moves
+        del pages
         self._head = self._known_tail = self._sequence = 0
 
     def write(self, kind: int, tick: int, data: memoryview | bytes | bytearray) -> bool:

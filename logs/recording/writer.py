@@ -73,14 +73,17 @@ class RecordingWriter:
         self.output = output or reserve_output(Path(path))
         self.header = header
         self.path = self.output.target
-        self.recorded = self._drawable = 0
-        self._undrawn: list[tuple[NDArray[np.int64], NDArray[np.uint8]]] = []
+        self.recorded = self._undrawn = 0
         self._stream = rr.RecordingStream(
             "aloft", recording_id=recording_id or header.name, send_properties=False
         )
         rr.set_log_time_enabled(False, recording=self._stream)
         self._records = RecordStream(self._stream, self.output, index=indexed)
         self._bus = split_bus(header)
+        size = self._bus.base.layout.size
+        most = min(DRAWN_TICKS, max(1, DRAWN_BYTES // max(1, size)))
+        self._drawn_ticks = np.empty(most, np.int64)
+        self._drawn_rows = np.empty((most, size), np.uint8)
         self._before: NDArray[np.uint8] | None = None
         self._last = -2
         shown = replace(header, bus=self._bus.base.layout)  # what is held is too large to be drawn
@@ -151,10 +154,12 @@ class RecordingWriter:
                 end = min(begin + most, int(last) + 1)
                 start = int(np.searchsorted(ticks, begin))
                 self._write_packed(begin, rows[start : start + end - begin])
-        if len(ticks):
-            self._undrawn.append((ticks.copy(), rows.copy()))
-            self._drawable += len(ticks)
-            if self._drawable >= min(DRAWN_TICKS, DRAWN_BYTES // max(1, rows.shape[1])):
+        while len(ticks):
+            begin = self._undrawn
+            self._undrawn = end = min(begin + len(ticks), len(self._drawn_ticks))
+            self._drawn_ticks[begin:end], ticks = ticks[: end - begin], ticks[end - begin :]
+            self._drawn_rows[begin:end], rows = rows[: end - begin], rows[end - begin :]
+            if end == len(self._drawn_ticks):
                 self.draw()
 
     def _write_held(self, number: int, ticks: NDArray[np.int64], rows: NDArray[np.uint8]) -> None:
@@ -197,9 +202,8 @@ class RecordingWriter:
         """Write for the viewer what has come since this was called last."""
         if not self._undrawn:
             return
-        ticks, rows = (np.concatenate(parts) for parts in zip(*self._undrawn, strict=True))
-        self._undrawn, self._drawable = [], 0
-        self._run.write_rows(ticks, rows)
+        count, self._undrawn = self._undrawn, 0
+        self._run.write_rows(self._drawn_ticks[:count], self._drawn_rows[:count])
         self._records.put_drawn()
 
     def write_keyframe(self, snapshot: Snapshot) -> None:

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
-from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses
+from ...robots.robot_description import RobotDescription
 from ..file.format import PLOTS, Header, RecordedRows, time_columns
 from .drawing import ChangedRows, Moments, SceneDisplay, ThinnedRows
 from .robot_shapes import reach_of

@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses, link_poses
+from ...robots.robot_description import RobotDescription
 from ..file.format import Header, RecordedRows, time_columns
 from .robot_shapes import scale_of
 from .scene_ports import PoseSource, ScenePorts

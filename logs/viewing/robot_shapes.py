@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...robots.description import Capsule, Hull, Link, RobotDescription, Shape
 from ...robots.kinematics import link_poses
-from ...robots.shapes import edges, surface
+from ...robots.robot_description import Link, RobotDescription
+from ...robots.shapes import Capsule, Hull, Shape, edges, surface
 from ...robots.surfaces import RobotSurfaces, Surface, joined, normals, quaternion_from_z
 
 USUAL_REACH = 0.4

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...mathematics.rotations import matrices_of_quaternions
-from ...robots.description import RobotDescription
+from ...robots.robot_description import RobotDescription
 from ...runtime.language.errors import AloftError
 from .contacts import ARROW_RADIUS, force_arrows
 from .drawing import Moments, SceneDisplay

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...robots.description import RobotDescription
+from ...robots.robot_description import RobotDescription
 from ..file.format import RecordedField
 
 MOST_NAMES = 48

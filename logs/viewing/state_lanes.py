@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...robots.description import RobotDescription
+from ...robots.robot_description import RobotDescription
 from ..file.format import STATES, Header, RecordedField, RecordedRows, entity_of
 from .signal_names import element_names
 

@@ -139,7 +139,7 @@ def error_record() -> NDArray[np.int64]:
 @cache
 def _error_words() -> tuple[int, int]:
     """Return the address of the function that reports an error, and that of its record."""
-    return machine_code_of(_report_module()).address, int(error_record().ctypes.data)
+    return machine_code_of(_report_module).address, int(error_record().ctypes.data)
 
 
 def _report_module() -> Any:

@@ -46,7 +46,7 @@ def chain_function() -> Callable[[ctypes.c_size_t], int]:
     entries made so far, and goes on behind it when it is called again. A Python error that a call
     has set is raised; then ``NEXT`` is the entry that failed.
     """
-    code = machine_code_of(_module())
+    code = machine_code_of(_module)
     function: Any = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_size_t)(code.address)
     return function  # type: ignore[no-any-return]  # llvmlite is not typed
 

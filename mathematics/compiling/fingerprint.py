@@ -22,6 +22,7 @@ from .arguments import ArgumentType
 from .equations import VERSION, reports_event
 from .kernel_registry import is_kernel, written_code
 from .kinds import argument_kinds
+from .store import file_digest
 
 
 def fingerprint(
@@ -132,12 +133,6 @@ def _numbers_digest() -> str:
     folder = Path(__file__).parent
     files = folder / "numpy_numbers.py", folder.parent / "elementary.py"
     return " ".join(file_digest(str(file)) for file in files)
-
-
-@cache
-def file_digest(file: str) -> str:
-    """Return the digest of a file's content. Raises ``OSError`` where there is none."""
-    return hashlib.blake2b(Path(file).read_bytes(), digest_size=16).hexdigest()
 
 
 def _code_texts(code: types.CodeType) -> Iterator[str]:

@@ -83,6 +83,10 @@ def address_of(function: Any) -> int:
 def _caller(count: int) -> int:
     """Return the address of machine code that calls a function; the words at an address are those
     of the function and of its ``count`` arguments."""
+    return machine_code_of(_caller_module, count).address
+
+
+def _caller_module(count: int) -> Any:
     from llvmlite import ir
 
     word = ir.IntType(64)
@@ -96,4 +100,4 @@ def _caller(count: int) -> int:
     kind = ir.FunctionType(ir.VoidType(), [word] * count).as_pointer()
     builder.call(builder.inttoptr(values[0], kind), values[1:])
     builder.ret_void()
-    return machine_code_of(module).address
+    return module

@@ -146,7 +146,7 @@ def _sign(to: Any, value: Any) -> Any:
 
 @cache
 def _interpreter() -> MachineCode:
-    return machine_code_of(_module(), optimise=True)
+    return machine_code_of(_module, optimise=True)
 
 
 def _module() -> Any:

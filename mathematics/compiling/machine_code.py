@@ -13,7 +13,9 @@ from importlib.metadata import version
 from itertools import count
 from typing import Any
 
+from ...files.cache import Cache
 from . import store
+from .object_file import place
 
 ENTRY = "aloft_entry"
 """The name of the only function that the object file of a kernel exports."""
@@ -45,6 +47,40 @@ def tools() -> str:
     return "; ".join(names)
 
 
+_HOSTS = Cache("processors")
+
+
+@cache
+def _host() -> tuple[str, str, str]:
+    """Return LLVM's name of the kind of system, of this processor and of its features, without LLVM where it has told
+    them before."""
+    name = hashlib.blake2b(
+        f"host; llvmlite {version('llvmlite')}; {_processor_text()}".encode(), digest_size=16
+    ).hexdigest()
+    kept = _HOSTS.load(name) if _processor_text() else None
+    if kept is None:
+        binding = _binding()
+        features = binding.get_host_cpu_features().flatten()
+        names = binding.get_process_triple(), binding.get_host_cpu_name()
+        kept = "\n".join([*names, features]).encode()
+        if _processor_text():
+            _HOSTS.save(name, kept)
+    triple, cpu, features = kept.decode().split("\n")
+    return triple, cpu, features
+
+
+@cache
+def _processor_text() -> str:
+    """Return what Linux says of the first processor, without what changes; empty elsewhere."""
+    try:
+        with open("/proc/cpuinfo", "rb") as file:
+            lines = file.read(8192).decode(errors="replace").split("\n\n")[0].splitlines()
+    except OSError:
+        return ""
+    same = ("vendor_id", "cpu family", "model", "stepping", "flags")
+    return "\n".join(line for line in lines if line.partition("\t")[0].strip() in same)
+
+
 @cache
 def _binding() -> Any:
     from llvmlite import binding
@@ -56,8 +92,7 @@ def _binding() -> Any:
 
 def process_triple() -> str:
     """LLVM's name of the kind of processor and system that this process runs on."""
-    triple: str = _binding().get_process_triple()
-    return triple
+    return _host()[0]
 
 
 def processor() -> tuple[str, str]:
@@ -68,8 +103,7 @@ def processor() -> tuple[str, str]:
     """
     if name := os.environ.get("ALOFT_CPU_NAME"):
         return name, os.environ.get("ALOFT_CPU_FEATURES", "")
-    binding = _binding()
-    return binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    return _host()[1:]
 
 
 def target_machine() -> Any:
@@ -231,8 +265,13 @@ class MachineCode:
 
     def __init__(self, code: bytes) -> None:
         # kept, because the code goes with it; one linker for all takes a third of the time of one each
-        self._loaded: Any = linked(code, ENTRY, _called_of_numba(code))
-        self.address: int = self._loaded[ENTRY]
+        needs = _called_of_numba(code)
+        if placed := None if needs else place(code, ENTRY):
+            self._loaded: Any = placed
+            self.address: int = placed.address
+        else:
+            self._loaded = linked(code, ENTRY, needs)
+            self.address = self._loaded[ENTRY]
         if not self.address:
             raise ValueError(f"the machine code has no function {ENTRY}")
         # This kind of prototype keeps the interpreter's lock and reports a Python error that the
@@ -249,18 +288,20 @@ def _linker() -> Any:
 _numbers = count()
 
 
-def machine_code_of(module: Any, *, optimise: bool = False) -> MachineCode:
-    """Return the function ``ENTRY`` of a module in LLVM's language, from the cache or made now; it
-    stays in memory.
+def machine_code_of(
+    make: Callable[..., Any], *arguments: int, optimise: bool = False
+) -> MachineCode:
+    """Return the function ``ENTRY`` of the module in LLVM's language that ``make`` returns, from the cache or made
+    now; it stays in memory. What the module has must stand in the file of ``make``.
 
     Such modules do what kernels cannot: call functions by their addresses, jump to one of many places.
     """
-    text = str(module)
-    make = optimised if optimise else assemble
-    name = hashlib.blake2b(f"{tools()}|{make.__name__}|{text}".encode(), digest_size=16).hexdigest()
+    source = f"{store.file_digest(make.__code__.co_filename)} {make.__qualname__} {arguments}"
+    name = hashlib.blake2b(f"{tools()}|{optimise}|{source}".encode(), digest_size=16).hexdigest()
     kept = store.load(name)
     if kept is None:
-        kept = make(text)
+        text = str(make(*arguments))
+        kept = optimised(text) if optimise else assemble(text)
         store.save(name, kept)
     code = MachineCode(kept)
     _alive.append(code)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import store
 from .arguments import ArgumentType
-from .fingerprint import file_digest, fingerprint
+from .fingerprint import fingerprint
 from .machine_code import OLDEST, OPTIONS, cross_compiled, process_triple
 from .translate import Translator
 
@@ -70,7 +70,7 @@ def _name(kernel: Callable[..., Any], signature: tuple[ArgumentType, ...], tripl
 
 @cache
 def _tools(triple: str) -> str:
-    compiler = [file_digest(str(file)) for file in sorted(FOLDER.glob("*.py"))]
+    compiler = [store.file_digest(str(file)) for file in sorted(FOLDER.glob("*.py"))]
     return "; ".join(
         (f"llvmlite {version('llvmlite')}", triple, OLDEST[triple], OPTIONS, *compiler)
     )

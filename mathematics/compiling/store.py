@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
+from functools import cache
 from pathlib import Path
 
 from ...files.cache import Cache, sealed, unsealed
 
-__all__ = ["cache_folder", "holds", "load", "save", "sealed", "unsealed"]
+__all__ = ["cache_folder", "file_digest", "holds", "load", "save", "sealed", "unsealed"]
 
 CACHE = Cache("kernels", ".o")
 
@@ -35,6 +37,12 @@ def holds(name: str) -> bool:
 def save(name: str, code: bytes) -> None:
     """Keep machine code; where the folder cannot be written it is simply not kept."""
     CACHE.save(_place(name), code)
+
+
+@cache
+def file_digest(file: str) -> str:
+    """Return the digest of a file's content. Raises ``OSError`` where there is none."""
+    return hashlib.blake2b(Path(file).read_bytes(), digest_size=16).hexdigest()
 
 
 def _place(name: str) -> str:

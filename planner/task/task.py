@@ -197,7 +197,7 @@ class JumpTask(FreeTimes):
         False, text="feet may hit the ground with speed and stop by an impulse; else they "
         "arrive at rest"
     )  # fmt: skip
-    knots: Knots = parameter(Knots(), text="numbers of intervals in each phase")
+    knots: Knots = parameter(Knots, text="numbers of intervals in each phase")
     profile: str = parameter(
         "", text="actuator profile; empty: that of the graph, or the robot's first"
     )
@@ -213,7 +213,7 @@ class JumpTask(FreeTimes):
     leg_clearance: float = parameter(
         0.01, unit="m", ge=0.0, le=0.2, text="least gap between the legs"
     )
-    weights: Weights = parameter(Weights(), text="weights of the cost")
+    weights: Weights = parameter(Weights, text="weights of the cost")
     margins: Margins | None = parameter(
         None, text="room that the plan leaves to the feedback; None: only 5 mrad at the joints"
     )

@@ -33,7 +33,8 @@ def parameter(
     max_length: int | None = None,
     live: bool = False,
 ) -> Any:
-    """Declare a parameter: its default, unit, bounds and text. Without a default it is required.
+    """Declare a parameter: its default, unit, bounds and text. Without a default it is required; the default of a group
+    is its class.
 
     ``live`` parameters may be changed while the graph runs: the block reads them from
     ``self.params`` in every tick, or recomputes what depends on them in ``Block.prepare``.
@@ -45,6 +46,9 @@ def parameter(
             default_factory=lambda: list(value), description=text, ge=ge, gt=gt, le=le, lt=lt,
             min_length=min_length, max_length=max_length, json_schema_extra=extra,
         )  # fmt: skip
+    if isinstance(default, type) and issubclass(default, Parameters):
+        # not validated: each group's validator takes 0.5 ms to make, and that of what it lies in is enough
+        default = default.model_construct()
     return Field(
         default, description=text, ge=ge, gt=gt, le=le, lt=lt,
         min_length=min_length, max_length=max_length, json_schema_extra=extra,

@@ -10,13 +10,13 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
 from ...mathematics.compiling.compile_calls import compile_calls
 from ..language.block import Block, Metric
-from ..language.collector import collector_off, collector_paused
+from ..language.collector import collector_off, collector_paused, objects_frozen
 from ..language.errors import AloftError, ExitCode, RunError
 from ..language.stages import CheckedGraph, ClockSpec
 from .failures import describe, locate
@@ -416,19 +416,12 @@ def _collector_paused(*, collect: bool) -> Iterator[None]:
     """Switch the garbage collector off within, and exempt all existing objects from requested
     collections, so that no collection interrupts a tick.
 
-    Where the caller, or Python at its start, has frozen objects already, they stay frozen and no
-    others are: ``gc.unfreeze`` knows only all.
-
     With ``collect`` garbage is collected before. That takes tens of milliseconds, which count where
     many short runs follow each other as fast as possible.
     """
-    with ExitStack() as after:
-        if collect:
-            gc.collect()
-        if not gc.get_freeze_count():
-            gc.freeze()
-            after.callback(gc.unfreeze)
-        after.enter_context(collector_off())
+    if collect:
+        gc.collect()
+    with objects_frozen(), collector_off():
         yield
 
 

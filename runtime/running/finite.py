@@ -1,4 +1,4 @@
-"""Checks once a tick that every float of the bus is finite.
+"""Checks once a tick that every float of the bus is finite that may have changed in it.
 
 The usual check is one cheap product; only if it fails is the element searched.
 """
@@ -7,15 +7,19 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Collection, Iterator
 from math import isfinite
 
 import numpy as np
 
 from ..language.errors import AloftError
+from ..language.layout import Layout
 from .memory import Region
 
 _PIECE = 8192
 """Elements in one product: fewer than make a BLAS library start threads."""
+_WORTH_A_CALL = 1024
+"""Elements that take as long as another call; fewer that have not changed are checked with their neighbours."""
 _TINY = 1e-150
 """The factor of every element: so small that no sum of finite products overflows, yet so large that
 usual products are not subnormal, which would be slow."""
@@ -42,13 +46,19 @@ class FiniteCheck:
     are, and takes one call. (A vector of zeros would do, but NumPy warns of zero times infinity.)
     """
 
-    def __init__(self, region: Region) -> None:
+    def __init__(self, region: Region, unchanged: Collection[str] = ()) -> None:
+        """Check all of a region but what lies together of blocks that write nothing in these ticks.
+
+        Args:
+            unchanged: their paths.
+        """
         self._region = region
         floats = region.sections["float64"]
         tiny = np.full(min(_PIECE, floats.size), _TINY)
         self._pieces = [
-            (floats[i : i + _PIECE], tiny[: floats[i : i + _PIECE].size])
-            for i in range(0, floats.size, _PIECE)
+            (floats[i : min(i + _PIECE, stop)], tiny[: min(_PIECE, stop - i)])
+            for start, stop in _ranges(region.layout, frozenset(unchanged))
+            for i in range(start, stop, _PIECE)
         ]
         self._product = np.zeros(())
         self._value = self._product.reshape(1).data  # reading through this allocates no array
@@ -65,3 +75,20 @@ class FiniteCheck:
         index = int(np.flatnonzero(~np.isfinite(floats))[0])
         place = self._region.layout.locate("float64", index)
         raise NotFiniteError(place, float(floats[index]))
+
+
+def _ranges(layout: Layout, unchanged: Collection[str]) -> Iterator[tuple[int, int]]:
+    """Yield the first element and the one after the last of what is checked of the section of floats."""
+    start = end = 0
+    for name, slot in layout.slots.items() if unchanged else ():
+        if slot.section == "float64" and name.rsplit(".", 2)[0] not in unchanged:
+            if slot.start - end >= _WORTH_A_CALL:
+                if start < end:
+                    yield start, end
+                start = slot.start
+            end = slot.start + slot.size
+    whole = layout.lengths["float64"]
+    if not unchanged or whole - end < _WORTH_A_CALL:
+        end = whole
+    if start < end:
+        yield start, end

@@ -84,7 +84,7 @@ class Ticker:
         self._now = time_source.now
         self._timing = timing
         self._fused = False
-        self._finite = FiniteCheck(bound.memory.bus) if finite_check else None
+        self._finite_check = finite_check
         self.programs, self._table = self._make_programs()
         self._previous: Program | None = None
         self.sinks: Sequence[Sink] = ()
@@ -121,8 +121,9 @@ class Ticker:
 
     def _make_program(self, outputs: Sequence[TickCall], updates: Sequence[TickCall]) -> Program:
         made = self._in_chains(outputs)
-        if self._finite is not None:
-            made.append(("", self._finite.check))
+        if self._finite_check:
+            unchanged = self.bound.blocks.keys() - {call.path for call in outputs}
+            made.append(("", FiniteCheck(self.bound.memory.bus, unchanged).check))
         made += self._in_chains(updates)
         owners, calls = [owner for owner, _ in made], [call for _, call in made]
         sampled = self.pacer is None and any(isinstance(owner, CallSequence) for owner in owners)

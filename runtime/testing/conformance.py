@@ -21,7 +21,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from traceback import extract_tb
 from types import CodeType, FunctionType
@@ -101,6 +101,16 @@ class Subject:
             snapshot = bench.snapshot()
             result.append(snapshot.bus + snapshot.state)
         return result
+
+    @cached_property
+    def traced(self) -> list[bytes]:
+        """The trace of an instance, which several checks compare with."""
+        return self.trace(self.bench())
+
+    @cached_property
+    def traced_in_python(self) -> list[bytes]:
+        """The same without machine code."""
+        return self.trace(self.bench(plain=True))
 
     def expect(self, holds: bool, message: str) -> None:
         """Raise ``ConformanceError`` with the message unless ``holds`` is true."""
@@ -191,9 +201,8 @@ def _set_up_once(subject: Subject, port: str, name: str, value: bytes) -> bool:
 
 def _bounds(subject: Subject) -> None:
     """Every index lies within its array; compiled code checks none and reads what lies behind."""
-    bench = subject.bench(plain=True)
     try:
-        subject.trace(bench)
+        assert subject.traced_in_python
     except IndexError as error:
         last = extract_tb(error.__traceback__)[-1]
         subject.expect(
@@ -244,8 +253,8 @@ def _machine(subject: Subject) -> None:
 
 def _deterministic(subject: Subject) -> None:
     """Two instances with the same inputs give the same outputs and states, to the last bit."""
-    first, second = subject.trace(subject.bench()), subject.trace(subject.bench())
-    for tick, (one, other) in enumerate(zip(first, second, strict=True)):
+    second = subject.trace(subject.bench())
+    for tick, (one, other) in enumerate(zip(subject.traced, second, strict=True)):
         subject.expect(one == other, f"two instances with equal inputs differ in tick {tick}")
 
 
@@ -255,9 +264,7 @@ def _kernels(subject: Subject) -> None:
     calls = _calls_of(subject.bench().block)
     if not calls:
         return
-    pairs = zip(
-        subject.trace(subject.bench()), subject.trace(subject.bench(plain=True)), strict=True
-    )
+    pairs = zip(subject.traced, subject.traced_in_python, strict=True)
     for tick, (one, other) in enumerate(pairs):
         subject.expect(one == other, f"machine code and plain Python differ in tick {tick}")
     bench = subject.bench(plain=True)

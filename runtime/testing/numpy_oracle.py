@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import types
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -81,7 +82,8 @@ def by_numpy(kernel: Any, arguments: Sequence[Any]) -> None:
     Raises:
         NotJudged: NumPy, or Python, does not take it; also where it raises an error of its own.
     """
-    if kernel.__closure__ is not None or numba_functions(kernel):
+    written = _as_written(kernel)
+    if written is None:
         raise NotJudged
     kinds = argument_kinds(kernel)
     names = arguments_of(kernel)
@@ -91,11 +93,19 @@ def by_numpy(kernel: Any, arguments: Sequence[Any]) -> None:
     ]
     try:
         with np.errstate(all="ignore"):
-            answer = _written(kernel, {})(*given)
+            answer = written(*given)
             if reports_event(kernel):
                 arguments[len(names)][0] = bool(answer)
     except Exception as error:
         raise NotJudged from error
+
+
+@lru_cache(64)
+def _as_written(kernel: Any) -> Callable[..., Any] | None:
+    """Return a kernel as it is written, or None if NumPy cannot take it."""
+    if kernel.__closure__ is not None or numba_functions(kernel):
+        return None
+    return _written(kernel, {})
 
 
 def difference(kernel: Any, arguments: Sequence[Any], found: Sequence[Any]) -> str:

@@ -105,7 +105,7 @@ def test_the_file_is_read_back_and_belongs_to_what_was_tuned(study: Read) -> Non
         read_tuned(found)
     best, _ = made_by(found, lambda run: Outcome(run.cell.arm != "one", ""))
     best["two"] = replace(best["two"], values={"double.goal": "3 cm", "counter.goal": [1, 2.5]})
-    assert write_tuned(found, best) == Path("study.tuned.yaml")
+    assert write_tuned(found, best, {}) == Path("study.tuned.yaml")
     tuned = read_tuned(found)
     assert tuned == {"fixed": {}, "one": {}, "two": dict(best["two"].values)}
     by_arm = {cell.arm: cell.overrides for cell in cells(found, tuned)}
@@ -186,6 +186,36 @@ def test_the_same_is_proposed_again_and_after_a_stop(study: Read) -> None:
     assert stopped is None and made[: len(part)] == part and len(part) > 2 * AT_ONCE
     assert found.tuning is not None
     assert searched(replace(found, tuning=replace(found.tuning, seed=1)))[1] != made
+
+
+def test_a_race_stops_draws_that_can_no_longer_win_and_finds_the_best_all_the_same(
+    study: Read,
+) -> None:
+    text = "tune: {seeds: 0:3, draws: 9, race: true, ranges: {counter.goal: [0, 100]}}\n"
+    found = study(text)
+    assert found.tuning is not None and found.tuning.race
+    draws: list[Draw] = []
+    checked = [replace(cell, key=str(n)) for n, cell in enumerate(tuning_cells(found))]
+
+    def make(runs: Sequence[Run]) -> list[Run]:
+        written = [run.cell.key == checked[0].key for run in runs]
+        good = [first == (run.seed != 1) for first, run in zip(written, runs, strict=True)]
+        return [replace(run, outcome=Outcome(g, "")) for g, run in zip(good, runs, strict=True)]
+
+    # as written 2 of 3 land; every other draw fails with the first seed, lands with the next, and fails again
+    best = search(found, checked, make, lambda arm, draw: draws.append(draw))
+    assert (best["default"].number, best["default"].successes, best["default"].n) == (0, 2, 3)
+    assert [(draw.n, draw.stopped) for draw in draws] == [(3, False)] * 9
+    draws.clear()
+    other = study(text.replace("0:3", "0:4"))
+    best = search(other, checked, make, lambda arm, draw: draws.append(draw))
+    assert [(draw.n, draw.stopped) for draw in draws] == [(4, False), *[(3, True)] * 8]
+    assert write_tuned(other, best, {"default": 8}).read_text().count("stopped: 8") == 1
+    assert best["default"].number == 0
+    with pytest.raises(
+        LoadError, match=r"study.yaml:3:\d+: wrong-kind: 'race' cannot be the number 2"
+    ):
+        study(text.replace("race: true", "race: 2"))
 
 
 def test_the_value_orders_draws_as_they_are_ranked() -> None:

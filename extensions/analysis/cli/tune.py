@@ -49,17 +49,25 @@ def tune(
         checked = check_cells(found, both, screen)[: len(tried)]
         folder = out or Path("results") / found.name
         total = tuning.runs_of_search(found, checked)
+        stopped: dict[str, int] = {}
+
+        def count(arm: str, draw: tuning.Draw) -> None:
+            stopped[arm] = stopped.get(arm, 0) + draw.stopped
+
         with Journal(folder / "tuning.jsonl") as journal:
             best = None
             with run_maker(
                 journal, workers, cluster, screen, f"tuning {found.name}", total
             ) as make:
-                best = tuning.search(found, checked, make)
+                best = tuning.search(found, checked, make, count)
             if best is None:
                 assert make.stopped is not None
                 raise typer.Exit(report_stop(make.stopped, make.asked, journal, screen, as_json))
-        path = tuning.write_tuned(found, best)
+        path = tuning.write_tuned(found, best, stopped)
         print_tuned(screen, found, best)
+        if found.tuning.race:
+            told = ", ".join(f"{count} of {arm}" for arm, count in stopped.items())
+            say(screen, f"draws that were stopped as they could no longer win: {told}")
         say(screen, f"tuned parameters: {path}")
         if as_json:
             broken = sum(bool(run.outcome and run.outcome.error) for run in make.made)

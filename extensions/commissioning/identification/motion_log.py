@@ -107,8 +107,9 @@ def log_of_graph(file: Path, block: str | None = None) -> tuple[MotionLog, Robot
     rows = played.rows
     if params.joints is None or rows is None:
         raise AloftError(f"{file}: {params.file} names no joints, and nothing is told without")
-    torque = None if params.joints.torque is None else rows.torque
-    return MotionLog(Path(params.file).name, period, rows.position, torque, played.commanded), robot
+    position = rows.position.at_ticks()
+    torque = None if params.joints.torque is None else rows.torque.at_ticks()
+    return MotionLog(Path(params.file).name, period, position, torque, played.commanded), robot
 
 
 def missing(log: MotionLog, robot: RobotDescription) -> list[str]:

@@ -65,7 +65,7 @@ class SteppingStonesParameters(Parameters):
     """Places of the stones."""
 
     stones: tuple[StoneParameters, ...] = parameter((), text="the stones, in order; none: `random`")
-    random: RandomStones = parameter(RandomStones(), text="parameters of their random draws")
+    random: RandomStones = parameter(RandomStones, text="parameters of their random draws")
     size: Interval = parameter((0.12, 0.20), unit="m", text="extent of a stone ahead and aside")
     start: Interval = parameter(
         (0.30, 0.40), unit="m",

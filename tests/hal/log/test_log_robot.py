@@ -7,7 +7,14 @@ import pytest
 
 import aloft
 from aloft.files.problems import LoadError
-from aloft.hal.log.columns import mean_over, with_hysteresis
+from aloft.hal.log.columns import (
+    TimedRows,
+    at_times,
+    last_rows,
+    mean_over,
+    take_row,
+    with_hysteresis,
+)
 from aloft.hal.log.log_file import LogError, read_log
 from aloft.hal.log.log_robot import LogRobot
 from aloft.hal.log.played_log import play
@@ -124,10 +131,29 @@ def test_units_of_a_header_signs_and_zeros(tmp_path):
             "position": {"columns": ["q1", "q2"], "scale": [1.0, -1.0], "offset": [0.0, 1.0]},
         },
     )  # fmt: skip
-    q = played.rows.position
+    q = played.rows.position.at_ticks()
     own = [k for k in range(q.shape[1]) if np.ptp(q[:, k]) > 0.1]
     assert len(own) == 2
     assert sorted(q[-1, k] for k in own) == pytest.approx([-2.0, 2.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("hold", [False, True])
+def test_a_tick_takes_the_bytes_that_are_interpolated_for_all_at_once(hold):
+    rng = np.random.default_rng(3)
+    stamps = np.cumsum(rng.choice([0.0, 0.01, 0.0101, 1e-7], 60))
+    values = rng.normal(size=(60, 3))
+    times = np.sort(np.concatenate([rng.uniform(-0.05, stamps[-1] + 0.05, 200), stamps]))
+    rows = TimedRows(
+        stamps, values, np.array([2, -1, 0]), np.array([7.0, 8.0, 9.0]), times,
+        last_rows(stamps, times, hold), np.array([not hold]),
+    )  # fmt: skip
+    expected = at_times(stamps, values, times, hold)
+    out = np.zeros(3)
+    for tick in range(len(times)):
+        take_row(rows, tick, out)
+        assert out[[0, 2]].tobytes() == expected[tick, [2, 0]].tobytes()
+        assert out[1] == 8.0
+    assert rows.at_ticks()[:, [0, 2]].tobytes() == expected[:, [2, 0]].tobytes()
 
 
 def play_of(folder, file, **changed):

@@ -8,7 +8,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from aloft.mathematics.compiling import compile_calls, fingerprint, shipped
+from aloft.mathematics.compiling import compile_calls, shipped, store
 from aloft.mathematics.compiling.arguments import type_of
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.mathematics.compiling.machine_code import process_triple
@@ -60,7 +60,7 @@ def package(tmp_path, monkeypatch):
 
 def forget():
     """What a new process does not know."""
-    for each in (shipped._archive, shipped._tools, fingerprint.file_digest):
+    for each in (shipped._archive, shipped._tools, store.file_digest):
         each.cache_clear()
 
 

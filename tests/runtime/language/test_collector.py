@@ -2,10 +2,12 @@
 
 import gc
 import threading
+from collections.abc import Iterator
 
 import pytest
 
-from aloft.runtime.language.collector import collector_off, collector_paused
+from aloft.runtime.language import collector
+from aloft.runtime.language.collector import collector_off, collector_paused, objects_frozen
 
 
 def test_threads_that_end_in_any_order_leave_the_collector_on() -> None:
@@ -45,3 +47,37 @@ def test_an_error_switches_it_on_again() -> None:
     with pytest.raises(ValueError, match="wrong"), collector_paused():
         raise ValueError("wrong")
     assert gc.isenabled()
+
+
+@pytest.fixture
+def nothing_frozen(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr(collector, "_frozen_elsewhere", False)
+    gc.unfreeze()
+    yield
+    gc.freeze()  # as tests/conftest.py leaves it
+
+
+def test_objects_are_frozen_until_the_last_one_has_ended(nothing_frozen: None) -> None:
+    first, second = objects_frozen(), objects_frozen()
+    with first:
+        second.__enter__()
+        with collector_paused():
+            pass
+        assert gc.get_freeze_count() > 0
+    assert gc.get_freeze_count() > 0
+    second.__exit__(None, None, None)
+    assert gc.get_freeze_count() == 0
+
+
+def test_what_others_froze_stays_frozen_and_is_counted_once(
+    nothing_frozen: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gc.freeze()
+    frozen, counted = gc.get_freeze_count(), []
+    count = gc.get_freeze_count
+    monkeypatch.setattr(gc, "get_freeze_count", lambda: counted.append(None) or count())
+    for _ in range(3):
+        with collector_paused(), objects_frozen():
+            made = [[] for _ in range(1000)]
+    assert len(made) == 1000 and len(counted) == 1
+    assert 0.999 * frozen <= count() <= frozen

@@ -5,6 +5,8 @@ from typing import Literal
 import pytest
 from pydantic import ValidationError
 
+from aloft.hal.simulated.parameters import SimulatorParameters
+from aloft.planner.task.task import JumpTask
 from aloft.runtime.language.parameters import (
     Parameters,
     is_live,
@@ -79,3 +81,16 @@ def test_none_stands_for_null() -> None:
     assert (ground.friction, ground.law, ground.name) == (None, "none", "none")
     with pytest.raises(ValidationError, match="depth"):
         Ground.model_validate({"depth": "none"})
+
+
+@pytest.mark.parametrize("model", (SimulatorParameters, JumpTask))
+def test_the_class_of_a_group_is_the_group_with_its_defaults(model: type[Parameters]) -> None:
+    def groups(model: type[Parameters]) -> list[Parameters]:
+        own = [info.default for info in model.model_fields.values()]
+        found = [each for each in own if isinstance(each, Parameters)]
+        return found + [inner for each in found for inner in groups(type(each))]
+
+    assert len(groups(model)) > 1
+    for group in groups(model):
+        assert repr(type(group)()) == repr(group)
+        assert type(group)() == group and not group.model_fields_set

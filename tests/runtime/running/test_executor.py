@@ -14,6 +14,7 @@ from aloft.blocks.general.integrators_and_delays import Integrator, UnitDelay
 from aloft.blocks.general.sources import Constant, SineWave
 from aloft.blocks.general.vectors import Vector
 from aloft.runtime.graph import load
+from aloft.runtime.language import collector
 from aloft.runtime.language.block import Block, Input, Output, State
 from aloft.runtime.language.errors import AloftError, ExitCode
 from aloft.runtime.language.parameters import Parameters
@@ -349,20 +350,23 @@ def test_two_runs_of_one_executor_are_refused() -> None:
 
 
 @pytest.mark.parametrize("frozen_before", [False, True])
-def test_the_collector_is_quiet_while_running_and_as_before_afterwards(frozen_before: bool) -> None:
+def test_the_collector_is_quiet_while_running_and_as_before_afterwards(
+    frozen_before: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     seen = []
+    monkeypatch.setattr(collector, "_frozen_elsewhere", False)
     (gc.freeze if frozen_before else gc.unfreeze)()
 
     class Witness(Ticks):
         def step(self) -> None:
-            seen.append(gc.isenabled())
+            seen.append((gc.isenabled(), gc.get_freeze_count() > 0))
 
     assert gc.isenabled()
     frozen = gc.get_freeze_count()
     assert (frozen > 0) == frozen_before
     try:
         run(checked_graph({"w": BlockUse(Witness)}, ticks=2))
-        assert seen == [False, False]
+        assert seen == [(False, True)] * 2
         # what is freed meanwhile, such as an entry of a cache, is frozen no more
         assert gc.isenabled() and 0.999 * frozen <= gc.get_freeze_count() <= frozen
     finally:

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 
+import aloft
 from aloft.runtime.language.layout import Layout, PortLayout
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.running.finite import FiniteCheck, NotFiniteError
@@ -76,3 +77,46 @@ def test_numpy_does_not_warn_of_what_is_found() -> None:
     command = [sys.executable, "-W", "always", "-c", text]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     assert (done.stdout, done.stderr) == ("a.y.value[0] is inf\n", "")
+
+
+def layout_of(*sizes: int) -> Layout:
+    """Blocks ``a``, ``b``, ... with a vector each."""
+    ports = []
+    for name, size in zip("abcdef", sizes, strict=False):
+        kind = type("Vector", (Signal,), {"v": Field(size, text="numbers")})
+        ports.append(PortLayout(f"{name}.y", kind, {}))
+    return Layout.of(ports)
+
+
+@pytest.mark.parametrize("sizes", [(3, 5000, 2), (5000, 3, 6000), (20_000, 20_000), (2000,)])
+@pytest.mark.parametrize("slow", [{"a"}, {"b"}, {"a", "c"}, {"a", "b", "c"}, set()])
+def test_what_blocks_write_that_run_is_checked_and_long_signals_of_others_are_not(
+    sizes: tuple[int, ...], slow: set[str]
+) -> None:
+    layout = layout_of(*sizes)
+    for name, slot in layout.slots.items():
+        for place in (0, slot.size // 2, slot.size - 1):
+            memory = Region(layout)
+            memory.field(name)[place] = np.nan
+            check = FiniteCheck(memory, slow)
+            if name[0] in slow and slot.size > 1024:
+                check.check()
+            elif name[0] not in slow:
+                with pytest.raises(NotFiniteError, match=f"{name}.{place}. is nan"):
+                    check.check()
+
+
+def test_a_slow_signal_is_checked_in_the_ticks_of_its_block() -> None:
+    text = """
+rate: 100 Hz
+blocks:
+  one: {use: blocks.Constant, with: {value: [VALUES]}}
+  slow: {use: blocks.Integrator, in: {u: one.y}, rate: 10 Hz}
+""".replace("VALUES", ", ".join(["1.0"] * 3000))
+    with aloft.load(text).open() as run:
+        run.step(1)
+        run._bound.memory.state.field("slow.x.value")[7] = np.nan
+        run.step(9)
+        wrong = r"'slow' wrote a value that is not finite at .* slow.y.value\[7\] is nan"
+        with pytest.raises(aloft.AloftError, match=wrong):
+            run.step(1)

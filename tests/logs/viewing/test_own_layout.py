@@ -7,12 +7,12 @@ import pytest
 from aloft import load
 from aloft.logs.file.format import Header
 from aloft.logs.file.header import header_of
-from aloft.logs.viewing.blueprint import (
+from aloft.logs.viewing.blueprint import recording_blueprint
+from aloft.logs.viewing.own_layout import (
     LayoutError,
     blueprint_with,
     layout_beside,
     read_layout,
-    recording_blueprint,
 )
 from aloft.runtime.running.memory import BoundGraph
 
