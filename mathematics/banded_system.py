@@ -22,7 +22,7 @@ TOGETHER = 4
 @kernel
 def assemble_normal(
     starts: Indices1D, rows: Indices1D, values: Array1D, inverse_weights: Array1D,
-    place: Indices1D, equations: int, band: Array2D, last: Indices1D, chosen: Indices1D,
+    place: Indices1D, equations: int, band: Array2D, last: Indices1D, chosen: Indices1D, entries: Array1D,
 ) -> bool:  # fmt: skip
     """Assemble A W^-1 A' of the chosen rows of a sparse matrix, in columns with ascending rows.
 
@@ -31,7 +31,7 @@ def assemble_normal(
         inverse_weights: the diagonal of W^-1, one for each column.
         place: which equation a row is, ascending, and -1 of those left out.
         equations: how many are chosen.
-        chosen: scratch, of the length of ``place``.
+        chosen, entries: scratch, as long as a column has non-zeros.
 
     Returns whether all of it is inside of the band, with a margin of ``TOGETHER`` - 1 diagonals.
     """
@@ -56,17 +56,16 @@ def assemble_normal(
         # Most rows of a column are inequalities that are left out.
         count = 0
         for a in range(starts[column], starts[column + 1]):
-            if place[rows[a]] >= 0:
-                chosen[count] = a
+            j = place[rows[a]]
+            if j >= 0:
+                chosen[count], entries[count] = j, values[a]
                 count += 1
         for first in range(count):
-            a = chosen[first]
-            if values[a] != 0.0:
-                j = place[rows[a]]
-                value = values[a] * inverse_weights[column]
+            if entries[first] != 0.0:
+                j = chosen[first]
+                value = entries[first] * inverse_weights[column]
                 for second in range(first, count):
-                    b = chosen[second]
-                    band[j, place[rows[b]] - j] += value * values[b]
+                    band[j, chosen[second] - j] += value * entries[second]
     return True
 
 
@@ -190,9 +189,11 @@ def smallest_correction(
     """
     count = equations[0]
     found[0] = False
+    if count > out.shape[0]:
+        return  # they cannot be independent
     if not factorised[0]:
         if not assemble_normal(
-            starts, rows, values, inverse_weights, place, count, band, last, chosen
+            starts, rows, values, inverse_weights, place, count, band, last, chosen, out
         ):
             return
         if not factorise_band(count, regularisation, band, last):

@@ -340,11 +340,11 @@ def search(
         made = (
             made_in_rounds(planned, allowed, make) if tuning.race else made_at_once(planned, make)
         )
-        for (name, each, trial), runs, done in zip(asked, planned, made, strict=True):
+        for (name, each, drawn), runs, done in zip(asked, planned, made, strict=True):
             found = replace(scored(each, done, tuning.least), stopped=len(done) < len(runs))
             on_draw(name, found)
-            if trial is not None:
-                samplers[name].tell(trial, value_to_minimise(found, len(runs)))
+            if drawn is not None:
+                samplers[name].tell(drawn, value_to_minimise(found, len(runs)))
             if name not in best or order(found) < order(best[name]):
                 best[name] = found
     return best

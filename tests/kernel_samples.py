@@ -203,7 +203,7 @@ UNUSED = {
     "aloft.mathematics.elementary.hypot": (0.3, -0.4),
     "aloft.mathematics.banded_system.assemble_normal": (
         CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3), 3,
-        np.zeros((3, 3)), *np.zeros((2, 3), dtype=np.int64),
+        np.zeros((3, 3)), *np.zeros((2, 3), dtype=np.int64), np.zeros(3),
     ),
     "aloft.mathematics.banded_system.factorise_band": (
         6, 1e-3, np.tile([3.0, 0.5, -0.2, 0.0, 0.0, 0.0], (6, 1)), np.array([2, 3, 4, 5, 5, 5]),

@@ -33,19 +33,8 @@ from .fault_detector_state import (
     Stop,
     Suspect,
 )
-from .gross_errors import (
-    find_gross_gravity,
-    find_gross_push,
-    find_gross_rate,
-    gravity_looks_like,
-    looks_like,
-    push_looks_like,
-    vector_text,
-)
-from .leg_forces import force_along, solve_leg
+from .gross_errors import find_gross_errors, stop_text, weigh
 
-_FAST = 5.0
-"""How much larger ``gross_rate`` is in the thrust."""
 _SLIGHT = 0.05
 """The share of a joint's peak torque that is added to its commanded torque."""
 _SPREAD = 0.05
@@ -77,11 +66,12 @@ class FaultDetector(Block):
     * **Switches.** By the legs' torques the feet carry more than ``open_load`` weights, and no switch is closed
       for ``open_time``. One foot across an edge may stand so, and does not count.
 
-    It only warns, for a robot often survives what is found, and damping would make it fall. **Before lift-off** it ends the run, which puts the
-    robot in damping, where a driver's unit or sign is wrong, or a sensor gives nonsense: with such an IMU a robot falls within 0.2 s. In squat
-    and thrust any suspect but an encoder ends it, too (``suspects_end``): a robot that still stands need not jump.
+    Most of it only warns, for a robot often survives what is found, and damping would make it fall. It ends the run, which puts the
+    robot in damping, where a fall follows:
 
-    * An axis of the gyroscope differs by more than ``gross_rate`` from the base's rate over its feet; in the thrust, where rates change by
+    * **Before lift-off** a suspect but an encoder ends squat and thrust (``suspects_end``): a robot that still stands need not jump. The
+      gyroscope, by which it balances, ends the run whenever the feet stand.
+    * An axis of the gyroscope differs by more than ``gross_rate`` from the base's rate over its feet before lift-off; in the thrust, where rates change by
       350 rad/s in a second and either may be late, by five times as much.
     * A reading of the gyroscope beyond ``largest_rate``, which is beyond the range of any, ends the run at once, in every phase: in degrees per second
       a thrust's 2.7 rad/s are 155, and within 4 ms the base would turn three times as fast.
@@ -89,8 +79,17 @@ class FaultDetector(Block):
       carry the robot. Neither the estimated attitude nor the switches are in it; the slope of the ground is, so it is a coarse check.
     * In squat and thrust, and after touchdown, while points stand and the legs' torques carry more than ``open_load``, the accelerometer reads less than ``gross_push`` of
       what they push, along the same normal. In healthy runs it read 0.56 to 1.5 times as much.
+    * In squat and thrust, under the same load, the accelerometer's x or y differs from what the legs push by more than ``gross_across`` weights, and fits with
+      the other sign.
+    * Before lift-off the plane of the points that stand has turned by more than ``gross_lean`` in the estimate since the robot first stood. Ground does not
+      turn; the attitude is wrong, as by a bias of the gyroscope that is below ``gross_rate``, and the robot is pushed over an edge of its feet.
+    * In squat and thrust no switch is closed for ``gross_open`` under feet that carry more than ``open_load``: its lift-off would be missed.
+    * In flight, from 50 ms before the touchdown is due, the accelerometer's z reads more than ``gross_landing`` while no switch is closed: the robot has landed
+      with switches that stay open, and its legs still hold the pose of the flight.
+    * After touchdown the base leans over by more than ``falling_rate`` for ``falling_time``, 40 ms after the impact or later: the robot
+      falls, whatever the cause, and damped legs break less.
 
-    The second must last for ``gross_time``, the others for ``lateness`` more. The sign of the accelerometer's x and y cannot be seen in an upright stand: turn the robot by hand
+    Gravity must be off for ``gross_time``, what has no time of its own for ``lateness`` more. The sign of the accelerometer's x and y cannot be seen in an upright stand: turn the robot by hand
     (``aloft bring-up`` asks for it).
 
     The first suspect is kept in the state, in
@@ -139,6 +138,7 @@ class FaultDetector(Block):
         constants.open_ticks = round(p.open_time / period)
         constants.gross_ticks[:] = (
             round((p.lateness + p.gross_time) / period), round(p.gross_time / period),
+            round(p.gross_open / period), round(p.falling_time / period),
         )  # fmt: skip
 
     @kernel
@@ -165,26 +165,9 @@ class FaultDetector(Block):
         rigid = turn_over_feet(joints, terms, params.slip_speed, scratch)
         on_the_ground = phase.phase >= Phase.STAND and phase.phase <= Phase.THRUST
         if state.stop == Stop.NONE:
-            most = params.gross_rate * (_FAST if phase.phase == Phase.THRUST else 1.0)
-            judged = on_the_ground and rigid
-            find_gross_rate(judged, most, params.largest_rate, imu, state, constants, scratch)
-            find_gross_gravity(imu, joints, terms, phase, state, params, constants, scratch)
-            jumps = phase.phase == Phase.SQUAT or phase.phase == Phase.THRUST
-            landed = phase.phase == Phase.LANDING or phase.phase == Phase.RECOVER
-            find_gross_push(
-                (jumps or landed) and rigid,
-                imu,
-                load,
-                terms,
-                phase,
-                state,
-                params,
-                constants,
-                scratch,
-            )
-            suspected = state.suspect != Suspect.NONE and state.suspect != Suspect.ENCODER
-            if state.stop == Stop.NONE and jumps and suspected and params.suspects_end:
-                state.stop = Stop.SUSPECT
+            find_gross_errors(
+                rigid, imu, joints, terms, load, switches, phase, state, params, constants, scratch,
+            )  # fmt: skip
         state.standing = state.standing + 1 if rigid else 0
         stands = state.standing > constants.settling
         compare_gyroscope(stands, imu, state, params, constants, scratch, period)
@@ -235,33 +218,9 @@ class FaultDetector(Block):
         return int(self.state.tick) * self.context.clock.base_period
 
     def _stop_reason(self) -> str:
-        """Describe in words what ended the run: what was read, what is right, and what that looks like."""
-        state, p = self.state, self.params
-        read, right = state.reading.copy(), state.right.copy()
-        if state.stop == Stop.GYROSCOPE:
-            axis = int(np.argmax(np.abs(read - right)))
-            if not np.abs(read).max() <= p.largest_rate or not np.isfinite(read).all():
-                axis = int(np.argmax(np.abs(read)))
-                return (
-                    f"the gyroscope's axis {'xyz'[axis]} reads {read[axis]:+.2f} rad/s, beyond the range of any; is it in degrees per "
-                    f"second? Correct the driver (largest_rate is {p.largest_rate:g} rad/s)"
-                )
-            return (
-                f"the gyroscope's axis {'xyz'[axis]} reads {read[axis]:+.2f} rad/s while the base turns over its feet by "
-                f"{right[axis]:+.2f}{looks_like(read[axis], right[axis])}; correct the driver or the IMU's mounting "
-                f"(gross_rate is {p.gross_rate:g} rad/s)"
-            )
-        if state.stop == Stop.PUSH:
-            return (
-                f"the accelerometer reads {vector_text(read)} m/s^2 while the legs push {vector_text(right)}"
-                f"{push_looks_like(read, right)}; correct the driver or the IMU's mounting (gross_push is {p.gross_push:g})"
-            )
-        if state.stop == Stop.SUSPECT:
-            return f"no jump with what is suspected: {self._reason()} (suspects_end)"
-        return (
-            f"the accelerometer reads {vector_text(read)} m/s^2 at rest, where the legs say {vector_text(right)}"
-            f"{gravity_looks_like(read, right)}; correct the driver or the IMU's mounting (gross_gravity is {p.gross_gravity:g} g)"
-        )
+        """Describe in words what ended the run."""
+        suspect = "" if self.state.suspect == Suspect.NONE else self._reason()
+        return stop_text(self.state, self.params, suspect)
 
     def _reason(self) -> str:
         """Describe the suspect in words, by its measured value and its limit."""
@@ -488,40 +447,6 @@ def is_slow(state: FaultDetectorState, rest_speed: float) -> bool:
     for k in range(state.speed.shape[0]):
         slow = slow and abs(state.speed[k]) < rest_speed
     return slow
-
-
-@kernel
-def weigh(
-    imu: ImuReading,
-    joints: JointState,
-    terms: DynamicsTerms,
-    constants: FaultDetectorConstants,
-    scratch: FaultDetectorScratch,
-) -> None:
-    """Compute the force on the base at rest that the legs' torques leave unexplained: of M_b a - J_b' f the force, in
-    the base's axes."""
-    mass, a, lacking, force = terms.mass_matrix, imu.specific_force, scratch.lacking, scratch.force
-    first = terms.velocity.shape[0] - joints.torque.shape[0]
-    for row in range(mass.shape[0]):
-        total = mass[row, 0] * a[0] + mass[row, 1] * a[1] + mass[row, 2] * a[2]
-        if row < 3:
-            lacking[row] = total
-        elif row >= first:
-            scratch.needed[row - first] = total - joints.torque[row - first]
-    for foot in range(constants.leg_joints.shape[0]):
-        leg = constants.leg_joints[foot]
-        solve_leg(
-            foot, terms.contact_jacobian, scratch.needed, leg, constants.foot_of_point, first,
-            scratch.normal, scratch.solution,
-        )  # fmt: skip
-        for point in range(constants.foot_of_point.shape[0]):
-            if constants.foot_of_point[point] == foot:
-                for axis in range(3):
-                    jacobian = terms.contact_jacobian[point, axis]
-                    force[axis] = force_along(jacobian, leg, scratch.solution, first)
-                for k in range(3):
-                    for axis in range(3):
-                        lacking[k] -= terms.contact_jacobian[point, axis, k] * force[axis]
 
 
 @kernel

@@ -25,7 +25,7 @@ class Suspect(IntEnum):
 
 
 class Stop(IntEnum):
-    """Why a run was ended before its lift-off."""
+    """Why a run was ended."""
 
     NONE = 0
     GYROSCOPE = 1
@@ -35,7 +35,15 @@ class Stop(IntEnum):
     PUSH = 3
     """In squat, thrust or landing the accelerometer does not read what the legs push."""
     SUSPECT = 4
-    """A suspect was found, and the robot was about to jump."""
+    """A suspect was found, and the robot was about to jump; or it is the gyroscope, by which it balances."""
+    LEAN = 5
+    """Before lift-off the ground under the feet seems to tip: the attitude is wrong."""
+    SWITCHES = 6
+    """In squat or thrust no switch is closed under load."""
+    LANDED = 7
+    """In flight the accelerometer reads a landing of which no switch tells."""
+    FALL = 8
+    """The robot falls after its touchdown."""
 
 
 class FaultDetectorParams(Parameters):
@@ -95,9 +103,30 @@ class FaultDetectorParams(Parameters):
         0.3, ge=0.0, lt=1.0,
         text="share of what the legs push that the accelerometer must read in squat, thrust and landing, or the run ends; zero: any",
     )  # fmt: skip
+    gross_across: float = parameter(
+        1.2, ge=0.0,
+        text="force along x or y, in weights, by which legs and accelerometer may differ in squat and thrust where the other sign fits; zero: any",
+    )  # fmt: skip
+    gross_lean: float = parameter(
+        0.05, unit="rad", ge=0.0,
+        text="by how much the ground may seem to tip before lift-off; zero: any",
+    )  # fmt: skip
+    gross_open: float = parameter(
+        0.02, unit="s", ge=0.0,
+        text="time for which all switches may be open under load in squat and thrust; zero: any",
+    )  # fmt: skip
+    gross_landing: float = parameter(
+        1.5, ge=0.0,
+        text="reading of the accelerometer's z in flight, in g, that is a landing; zero: none",
+    )  # fmt: skip
+    falling_rate: float = parameter(
+        4.0, unit="rad/s", ge=0.0,
+        text="rate of leaning over for `falling_time` after touchdown that is a fall; zero: none",
+    )  # fmt: skip
+    falling_time: float = parameter(0.02, unit="s", ge=0.0, text="see `falling_rate`")
     suspects_end: bool = parameter(
         True,
-        text="whether a suspect other than an encoder ends the run in squat and thrust",
+        text="whether a suspect other than an encoder ends the run in squat and thrust, and the gyroscope whenever the robot stands",
     )
     gross_time: float = parameter(
         0.004,
@@ -129,10 +158,12 @@ class FaultDetectorState(Signal):
     lacking = Field(3, unit="N", frame="body", text="mean force that the legs lack")
     open = Field(dtype="int64", text="ticks in a row with load and no switch closed")
     gross = Field(
-        5,
+        10,
         dtype="int64",
-        text="ticks in a row with a gross error of gyroscope axes, gravity and push",
+        text="ticks in a row with a gross error of gyroscope axes, gravity, push, push across, lean, switches, landing, fall",
     )
+    ground = Field(3, frame="world", text="normal of the plane of the feet when they first stood")
+    grounded = Field(dtype="bool", text="it is known")
     rested = Field(dtype="int64", text="ticks of rest so far")
     stop = Field(dtype="int64", values=Stop, text="why the run was ended")
     stop_tick = Field(dtype="int64", text="when")
@@ -153,7 +184,9 @@ class FaultDetectorConstants(Signal):
     settling = Field(dtype="int64", text="ticks for which points have stood before they count")
     open_ticks = Field(dtype="int64", text="ticks with load and open switches that are no fault")
     gross_ticks = Field(
-        2, dtype="int64", text="ticks in a row with a gross rate or gravity that are borne"
+        4,
+        dtype="int64",
+        text="ticks in a row that are borne: of a gross rate, of gravity, of open switches, of a fall",
     )
 
 

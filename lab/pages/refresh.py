@@ -365,7 +365,7 @@ def write_paper_solvers(file: Path) -> None:
 
 def write_paper_plans(file: Path) -> None:
     """Write what plans of the paper's problem ask of the motors."""
-    text = noted_table(read_json(file), "a jump of 12 cm in place")
+    text = noted_table(read_json(file), "a jump of 12 cm in place, or as named")
     refresh(DOCS / "planning.md", "paper plans", text)
 
 

@@ -20,16 +20,21 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from statistics import median
+from types import MappingProxyType
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
 DATA = "docs/data"
 PAGES: Mapping[str, tuple[str, ...]] = {
     "paper_controller": ("docs/comparisons.md",),
+    "paper_limits": ("docs/comparisons.md",),
     "paper_factors": ("docs/comparisons.md",),
     "paper_plans": ("docs/comparisons.md",),
     "paper_polar": ("docs/landing.md",),
     "paper_pushes": ("docs/landing.md",),
+    "push_strongest": ("docs/landing.md",),
+    "somersaults": ("docs/planning.md",),
 }
 CONTROLLER = (
     "blocks",
@@ -43,13 +48,25 @@ CONTROLLER = (
 """What the outcome of a jump depends on."""
 MORE: Mapping[str, tuple[str, ...]] = {"paper_plans": ("planner",)}
 """What the outcome of a study depends on beside that."""
+MEDIANS: Mapping[str, Mapping[str, tuple[str, float]]] = {
+    "paper_limits": {
+        "ahead [cm]": ("jump_distance_x_m", 100.0),
+        "turned [deg]": ("jump_yaw_deg", 1.0),
+    }
+}
+"""Columns of a study's table beside the counts: a metric, and its factor. The median is over the runs that stand."""
 STANDS_TILT = 5.0
 """deg, at rest; the paper's criterion in words is that the robot lands stably."""
 OUTCOMES = ("n", "successes", "stands")
 
 
-def rows_of(folder: Path, labels: Sequence[str]) -> list[dict[str, Any]]:
-    """Return the cells of a study's results, each with its values of ``labels`` and counts of its runs.
+def rows_of(
+    folder: Path,
+    labels: Sequence[str],
+    medians: Mapping[str, tuple[str, float]] = MappingProxyType({}),
+) -> list[dict[str, Any]]:
+    """Return the cells of a study's results, each with its values of ``labels``, counts of its runs, and ``medians`` of
+    those that stand.
 
     A run *stands* if it did not fall and its torso is at most 5 degrees from upright at the end; a run that was ended
     by a fall has no final tilt.
@@ -58,18 +75,28 @@ def rows_of(folder: Path, labels: Sequence[str]) -> list[dict[str, Any]]:
 
     runs = parquet.read_table(folder / "runs.parquet").to_pylist()
     found: dict[tuple[Any, ...], dict[str, Any]] = {}
+    standing: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
     for run in runs:
         key = tuple(run[label] for label in labels)
         row = found.setdefault(
             key, {**dict(zip(labels, key, strict=True)), **dict.fromkeys(OUTCOMES, 0), "misses": {}}
         )
         tilt = run.get("final_tilt_deg")
+        stands = tilt is not None and tilt < STANDS_TILT
         row["n"] += 1
         row["successes"] += bool(run["success"])
-        row["stands"] += tilt is not None and tilt < STANDS_TILT
+        row["stands"] += stands
+        if stands:
+            standing.setdefault(key, []).append(run)
         if not run["success"]:
             miss = kind_of_miss(run["reason"])
             row["misses"][miss] = row["misses"].get(miss, 0) + 1
+    for key, row in found.items():
+        for name, (metric, factor) in medians.items():
+            values = [
+                factor * run[metric] for run in standing.get(key, []) if run[metric] is not None
+            ]
+            row[name] = round(median(values), 1) if values else None
     return list(found.values())
 
 
@@ -77,31 +104,31 @@ def labels_of(folder: Path) -> list[str]:
     """Return the names of a study's axes that have more than one value."""
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     rows = summary["rows"]
-    known = ("task", "jump", "arm", "feet", "steps")
+    known = ("task", "jump", "arm", "trial", "feet", "steps")
     return [name for name in known if name in rows[0] and len({str(row[name]) for row in rows}) > 1]
 
 
 def kind_of_miss(reason: str) -> str:
     """Return why a run is no success, in a word or two."""
     kinds = {
-        "fell": "fell", "flight of": "flight too short", "rose": "rise", "jumped": "place", "turned": "turn",
+        "safety": "safety stop", "fell": "fell", "flight of": "flight too short", "rose": "rise", "jumped": "place", "turned": "turn",
         "tilt": "tilt", "torso": "tilt", "joint": "joint limit", "slid": "feet slid", "moved": "feet slid",
-        "step": "stepped", "touch": "touched",
+        "stepped": "stepped", "touched": "touched",
     }  # fmt: skip
     return next((kind for text, kind in kinds.items() if text in reason), "other")
 
 
 def table_of(data: Mapping[str, Any]) -> str:
     """Return the Markdown table of a data file."""
-    labels = data["labels"]
-    lines = [
-        f"| {' | '.join(labels)} | stands | succeeds | misses |",
-        "|" + "---|" * (len(labels) + 3),
-    ]
+    labels, medians = data["labels"], data.get("medians", [])
+    head = [*labels, *medians, "stands", "succeeds", "misses"]
+    lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
     for row in data["rows"]:
         misses = sorted(row["misses"].items(), key=lambda item: (-item[1], item[0]))
         told = ", ".join(f"{count} {kind}" for kind, count in misses) or "-"
-        shown = " | ".join(str(row[label]) for label in labels)
+        cells = [str(row[label]) for label in labels]
+        cells += ["-" if row[name] is None else f"{row[name]:g}" for name in medians]
+        shown = " | ".join(cells)
         counts = f"{row['stands']} of {row['n']} | {row['successes']} of {row['n']}"
         lines.append(f"| {shown} | {counts} | {told} |")
     seeds = data["seeds"]
@@ -191,10 +218,10 @@ def keep(root: Path, folders: Sequence[Path], commit: str) -> Path:
         json.loads((folder / "summary.json").read_text(encoding="utf-8")) for folder in folders
     ]
     name = summaries[0]["study"]
-    labels = labels_of(folders[0])
+    labels, medians = labels_of(folders[0]), MEDIANS.get(name, {})
     rows: dict[tuple[Any, ...], dict[str, Any]] = {}
     for folder in folders:
-        for row in rows_of(folder, labels):
+        for row in rows_of(folder, labels, medians):
             key = tuple(row[label] for label in labels)
             if key not in rows or row["n"] > rows[key]["n"]:
                 rows[key] = row
@@ -205,6 +232,7 @@ def keep(root: Path, folders: Sequence[Path], commit: str) -> Path:
         "pages": list(PAGES[name]),
         "seeds": max((summary["seeds"] for summary in summaries), key=len),
         "labels": labels,
+        "medians": list(medians),
         "rows": list(rows.values()),
     }
     path = root / DATA / f"{name}.json"

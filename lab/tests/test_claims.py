@@ -1,4 +1,4 @@
-"""Counts of runs in the prose of pages are those of data files, or the page owns up to having none."""
+"""Counts of runs in the prose of pages are those of data files."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).parents[2]
-WITHOUT_DATA = 60
-"""Counts that were made before studies kept their data. There may be fewer of them, and never more."""
 
 
 @pytest.fixture(scope="module")
@@ -19,15 +17,8 @@ def script(docs_script: Callable[[str], ModuleType]) -> ModuleType:
     return docs_script("claims")
 
 
-def test_every_count_of_runs_on_the_pages_has_its_data_or_the_page_owns_up(
-    script: ModuleType,
-) -> None:
+def test_every_count_of_runs_on_the_pages_has_its_data(script: ModuleType) -> None:
     assert list(script.wrong(ROOT)) == []
-
-
-def test_counts_without_data_only_become_fewer(script: ModuleType) -> None:
-    bare = [c for claims in script.read(ROOT).values() for c in claims if not script.has_source(c)]
-    assert sum(len(script.COUNT.findall(claim["says"])) for claim in bare) <= WITHOUT_DATA
 
 
 @pytest.fixture
@@ -87,11 +78,8 @@ def test_goals_that_are_met_are_counted_in_the_table(script: ModuleType, pages: 
     ]
 
 
-def test_a_page_owns_up_to_counts_without_data(script: ModuleType, pages: Path) -> None:
-    line = "*No data file: one count of runs on this page was made before studies kept their data with the commit of the code.*"
+def test_a_claim_names_where_its_count_comes_from(script: ModuleType, pages: Path) -> None:
     claim = "  - says: lands 3 of 9\n"
-    assert wrong(script, pages, f"It lands 3 of 9.\n\n{line}\n", claim) == []
     assert wrong(script, pages, "It lands 3 of 9.\n", claim) == [
-        f"page.md: it has to own up by {line!r}, and by no other such line"
+        "page.md: 'lands 3 of 9' names neither data nor goals"
     ]
-    assert wrong(script, pages, f"Nothing.\n\n{line}\n", "  []\n")

@@ -78,6 +78,46 @@ def test_runs_that_stand_are_counted_beside_those_that_succeed(
     ]
 
 
+@pytest.mark.parametrize(
+    ("reason", "kind"),
+    [
+        (
+            "something other than the contact points touched, first at 1.4 s, in 77 physics steps",
+            "touched",
+        ),
+        ("stepped: a foot was off the ground for 0.028 s after landing", "stepped"),
+        (
+            "safety: foot switch right_toe is stuck: it was open under a foot that stood",
+            "safety stop",
+        ),
+        ("no such reason", "other"),
+    ],
+)
+def test_why_a_run_is_no_success_in_a_word(script: ModuleType, reason: str, kind: str) -> None:
+    assert script.kind_of_miss(reason) == kind
+
+
+def test_medians_are_of_runs_that_stand(script: ModuleType, tmp_path: Path) -> None:
+    turns = [(20.0, 0.4), (21.0, 0.4), (25.0, 0.3), (170.0, 30.0)]
+    runs = [{**run("turn", False, tilt, "turned"), "jump_yaw_deg": yaw} for yaw, tilt in turns]
+    folder = results(
+        tmp_path / "found", [*runs, {**run("up", False, None, "fell"), "jump_yaw_deg": 1.0}]
+    )
+    rows = script.rows_of(folder, ["task"], {"turned [deg]": ("jump_yaw_deg", 1.0)})
+    assert [row["turned [deg]"] for row in rows] == [21.0, None]
+    data = {
+        "labels": ["task"],
+        "medians": ["turned [deg]"],
+        "rows": rows,
+        "seeds": [5],
+        "commit": "0",
+    }
+    head, _, first, second, *_ = script.table_of(data).splitlines()
+    assert head == "| task | turned [deg] | stands | succeeds | misses |"
+    assert first == "| turn | 21 | 3 of 4 | 0 of 4 | 4 turn |"
+    assert second == "| up | - | 0 of 1 | 0 of 1 | 1 fell |"
+
+
 def test_cells_with_more_seeds_take_the_place_of_those_with_fewer(
     script: ModuleType, tmp_path: Path
 ) -> None:

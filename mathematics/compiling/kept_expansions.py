@@ -12,6 +12,7 @@ from typing import Any
 
 from ...files.cache import Cache
 from .equations import expanded_code
+from .expressions import NUMBERS, numbers
 from .fingerprint import fingerprint
 
 EXPANSIONS = Cache("expansions")
@@ -35,7 +36,15 @@ def kept_expansion(function: Any, code: CodeType) -> CodeType:
     if kept is not None:
         with suppress(EOFError, TypeError, ValueError):
             found: CodeType = marshal.loads(kept)
+            if NUMBERS in _names(found):
+                function.__globals__.setdefault(NUMBERS, numbers())
             return found
     made = expanded_code(function, code)
     EXPANSIONS.save(name, marshal.dumps(made))
     return made
+
+
+def _names(code: CodeType) -> set[str]:
+    """All names that code looks up in its module, also in functions within."""
+    inner = (each for each in code.co_consts if isinstance(each, CodeType))
+    return set(code.co_names).union(*map(_names, inner))

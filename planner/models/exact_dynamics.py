@@ -128,6 +128,7 @@ class ExactDynamics:
         self._calls: dict[object, tuple[KernelCall, GivenMotion, MotionTerms]] = {}
         self._links = (robot.base, *(joint.child for joint in robot.joints))
         self._columns = [self._moving(frame) for frame in built.contact_frames]
+        self._foot_columns = [self._moving(frame) for frame in built.sole_frames]
 
     def _fixed_points(self, robot: RobotDescription) -> FixedPoints:
         """Return the contact points and behind them the sole centres. Of balls both are the lowest point."""
@@ -214,37 +215,41 @@ class ExactDynamics:
     def feet(self, position: Array, velocity: Array) -> FeetStates:
         """Return what a reference of the controller holds of n states."""
         pin, model, data = self.pin, self.model, self.data
-        axes, count, feet = (
-            pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
-            len(position),
-            len(self.sole_frames),
-        )
+        count, feet = len(position), len(self.sole_frames)
         place, points = (count, 3), (count, len(self.contact_frames), 3)
         of_feet, angle = (count, feet, 3), (count, feet)
         shapes = (place, place, place, points, of_feet, of_feet, angle, angle)
         found = FeetStates(*(np.empty(shape) for shape in shapes))
-        jacobians = np.empty((count, feet, 6, model.nv))
+        columns = np.empty((count, 6, model.nv))
         turns = np.empty((count, feet, 3, 3))
         base = np.empty((count, 3, 3))
         # What Pinocchio places is written in memory that stays, which is looked up once.
+        com, moved, screws = data.com[0], data.hg, data.J
+        linear, angular = moved.linear, moved.angular
         of_contacts = [data.oMf[frame].translation for frame in self.contact_frames]
         of_soles = [data.oMf[frame].translation for frame in self.sole_frames]
         of_turns = [data.oMf[frame].rotation for frame in self.sole_frames]
         of_base = data.oMi[1].rotation
         for i, (q, v) in enumerate(zip(position, velocity, strict=True)):
-            moved = pin.computeCentroidalMomentum(model, data, q, v)
-            found.com[i], found.com_velocity[i] = data.com[0], moved.linear
-            found.momentum[i] = moved.angular
-            pin.computeJointJacobians(model, data, q)
+            pin.computeCentroidalMomentum(model, data, q, v)
+            pin.computeJointJacobians(model, data)
             pin.updateFramePlacements(model, data)
+            found.com[i], found.com_velocity[i], found.momentum[i] = com, linear, angular
             found.points[i] = self._contact_places() if self.balls else of_contacts
-            found.soles[i], turns[i], base[i] = of_soles, of_turns, of_base
-            for foot, frame in enumerate(self.sole_frames):
-                jacobians[i, foot] = pin.getFrameJacobian(model, data, frame, axes)
+            found.soles[i], turns[i], base[i], columns[i] = of_soles, of_turns, of_base, screws
         found.yaw[:], found.pitch[:] = self._angles(turns, base)
         up = turns[..., 2]
         found.com_velocity[:] /= self.mass
-        rates = np.add.reduce(jacobians * velocity[:, None, None, :], axis=-1)
+        rates = np.empty((count, feet, 6))
+        for foot, moving in enumerate(self._foot_columns):
+            # Of the columns seen from the world's origin those at the sole.
+            jacobian = np.zeros(columns.shape)
+            own = columns[:, :, moving]
+            jacobian[:, 3:, moving] = own[:, 3:]
+            arm = found.soles[:, foot, :, None]
+            lever = arm[:, AFTER] * own[:, [5, 3, 4]] - arm[:, BEFORE] * own[:, [4, 5, 3]]
+            jacobian[:, :3, moving] = own[:, :3] - lever
+            rates[:, foot] = np.add.reduce(jacobian * velocity[:, None, :], axis=-1)
         found.sole_velocity[:] = rates[:, :, :3]
         for ball in self.balls:
             found.soles[:, ball.foot] = found.points[:, ball.point]

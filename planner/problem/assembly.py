@@ -171,7 +171,7 @@ class Assembly:
             costs, rows = piece.value.map(count)(z, w)
             cost = cost + ca.sum2(costs)
             value_rows.append(ca.vec(rows))
-            gradient.append(ca.vec(piece.jacobian.map(count)(z, w)[1]))
+            gradient.append(ca.vec(piece.gradient.map(count)(z, w)))
             jacobian_cost_rows.append(self.piece_columns[name].ravel())
             index = np.where(self.piece_rows[name] < 0, self.constraints, self.piece_rows[name])
             multipliers = _gather(padded, index.ravel(), (-1, count))
@@ -220,7 +220,7 @@ class Assembly:
         for name, users in self.users.items():
             z = _gather(x, self.piece_columns[name].ravel(), (-1, len(users)))
             w = ca.reshape(p[self.piece_parameters[name]], -1, len(users))
-            found, _, jacobian = self.pieces[name].jacobian.map(len(users))(z, w)
+            found, jacobian = self.pieces[name].jacobian.map(len(users))(z, w)
             rows.append(ca.vec(found))
             values.append(_nonzeros(jacobian))
         matrix = self._jacobian(values)
@@ -251,7 +251,7 @@ class Assembly:
         """
         rows, columns = [], []
         for name in self.users:
-            triplets = self.pieces[name].jacobian.sparsity_out(2).get_triplet()
+            triplets = self.pieces[name].jacobian.sparsity_out(1).get_triplet()
             local_rows, local_columns = (np.array(x, dtype=np.int64) for x in triplets)
             rows.append(self.piece_rows[name][:, local_rows].ravel())
             columns.append(self.piece_columns[name][:, local_columns].ravel())

@@ -229,10 +229,11 @@ SLOPED_PIECES = ("stance", "free_stance", "impact", "contact", "air", "obstacle"
 
 @dataclass(frozen=True)
 class StageFunction:
-    """The functions of one piece: ``value(z, w) -> f, g``; ``jacobian(z, w) -> g, grad f, jac g``;
-    ``hessian(z, w, lam_f, lam_g) -> gradient and Hessian of the Lagrangian``."""
+    """The functions of one piece: ``value(z, w) -> f, g``; ``gradient(z, w) -> grad f``;
+    ``jacobian(z, w) -> g, jac g``; ``hessian(z, w, lam_f, lam_g) -> gradient and Hessian of the Lagrangian``."""
 
     value: Any
+    gradient: Any
     jacobian: Any
     hessian: Any
 
@@ -494,7 +495,8 @@ def derived(
     cost, rows = lift.put_back([cost, ca.densify(rows)])
     return StageFunction(
         ca.Function(f"{prefix}_value", [z, w], [cost, rows]),
-        ca.Function(f"{prefix}_jacobian", [z, w], [rows, gradient, jacobian]),
+        ca.Function(f"{prefix}_gradient", [z, w], [gradient]),
+        ca.Function(f"{prefix}_jacobian", [z, w], [rows, jacobian]),
         ca.Function(f"{prefix}_hessian", [z, w, lam_f, lam_g], [ca.densify(slope), hessian]),
     )
 

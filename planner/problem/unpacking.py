@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Array
+from ...mathematics.compiling.lanes import Lanes
 from ..models.euler_angles import coordinates_of, pose_of, twist_of
+from ..models.interpreted import interpreted
 from ..models.symbolic_model import SymbolicModel, centroidal_momentum
 from ..task.plan import PlannedJump
 from ..task.sequence import LEVEL, ground_axes
@@ -245,28 +247,7 @@ def pack(problem: FullProblem, plan: PlannedJump, guess: Array | None = None) ->
     return values
 
 
-class _Evaluator:
-    """A function of one instant at a fixed number of instants, on memory that is kept: CasADi's own call of it for many
-    makes matrices and a function of many instants each time."""
-
-    def __init__(self, function: Any, count: int) -> None:
-        of_all = function.map(count)
-        self._given = [np.zeros((count, function.size1_in(i))) for i in range(function.n_in())]
-        self._found = np.zeros((count, function.size1_out(0)))
-        self._buffer, self._run = of_all.buffer()
-        for number, array in enumerate(self._given):
-            self._buffer.set_arg(number, array.data)
-        self._buffer.set_res(0, self._found.data)
-
-    def __call__(self, *given: Array) -> Array:
-        """Return the results (count, n) of rows (count, n) for each argument."""
-        for own, values in zip(self._given, given, strict=True):
-            own[:] = values
-        self._run()
-        return self._found.copy()
-
-
-_evaluators: dict[tuple[int, int], tuple[SymbolicModel, _Evaluator, _Evaluator]] = {}
+_evaluators: dict[tuple[int, int], tuple[SymbolicModel, tuple[Lanes, ...]]] = {}
 KEPT = 32
 """Evaluators that are kept, of a model and a number of instants."""
 
@@ -278,18 +259,27 @@ def _evaluate(
     """Return the centre of mass, its velocity and the angular momentum at the knots; joint torques in the middle of the
     intervals.
     """
-    key = id(model), len(q)
+    key, functions = (id(model), len(q)), _functions(model, force.shape[1])
+    given = (q, v), (middle, moving, bend, force)
     if key not in _evaluators:
         if len(_evaluators) >= KEPT:
             _evaluators.clear()
-        states, torques = _functions(model, force.shape[1])
-        _evaluators[key] = model, _Evaluator(states, len(q)), _Evaluator(torques, len(q))
-    _, states_of, torques_of = _evaluators[key]
-    found = states_of(q, v)
-    return (
-        found[:, :3].copy(), found[:, 3:6].copy(), found[:, 6:].copy(),
-        torques_of(middle, moving, bend, force),
-    )  # fmt: skip
+        # CasADi's own call takes as long as ten of the lanes, but these are not made for one plan.
+        _evaluators[key] = model, ()
+        states, torques = (
+            np.array(function.map(len(q))(*(array.T for array in arrays))).T
+            for function, arrays in zip(functions, given, strict=True)
+        )
+    else:
+        if not _evaluators[key][1]:
+            made = tuple(interpreted(function).lanes(len(q)) for function in functions)
+            _evaluators[key] = model, made
+        for lanes, arrays in zip(_evaluators[key][1], given, strict=True):
+            for own, values in zip(lanes.inputs, arrays, strict=True):
+                own[:] = values
+            lanes.run()
+        states, torques = (lanes.outputs[0].copy() for lanes in _evaluators[key][1])
+    return states[:, :3].copy(), states[:, 3:6].copy(), states[:, 6:].copy(), torques
 
 
 _of_models: dict[int, tuple[SymbolicModel, Any, Any]] = {}

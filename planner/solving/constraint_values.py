@@ -12,8 +12,8 @@ import numpy as np
 
 from ...mathematics.arrays import Array, Indices
 from ...mathematics.compiling.lanes import Lanes
+from ..models.interpreted import InterpretedFunction
 from ..problem.assembly import Assembly
-from .interpreted import InterpretedFunction
 
 
 class _Piece(NamedTuple):
@@ -48,28 +48,11 @@ class ConstraintValues:
         self._row_sources = assembly.row_sources()
         self._linear_rows, self._linear_columns, self._signs = assembly.linear_terms
         self.values, self.entries = np.zeros(assembly.constraints), np.zeros(pattern.nnz())
-        self._of_rows = self._pieces(assembly, "value", 1)
-        self._of_jacobian = self._pieces(assembly, "jacobian", 2)
+        self._of_rows = _pieces(assembly, "value")
+        self._of_jacobian = _pieces(assembly, "jacobian")
         self._piece_rows = np.zeros(sum(each.found.size for each in self._of_rows) + 1)
         count = sum(each.found.size for each in self._of_jacobian)
         self._piece_entries = np.concatenate([np.zeros(count), self._signs])
-
-    def _pieces(self, assembly: Assembly, kind: str, result: int) -> list[_Piece]:
-        found = []
-        for name, users in assembly.users.items():
-            function: InterpretedFunction = getattr(assembly.pieces[name], kind)
-            lanes = Lanes(
-                function.program, len(users),
-                [len(each.rows) for each in function.inputs],
-                [len(each.rows) for each in function.outputs],
-            )  # fmt: skip
-            found.append(
-                _Piece(
-                    lanes, assembly.piece_columns[name], assembly.piece_parameters[name],
-                    lanes.outputs[result],
-                )
-            )  # fmt: skip
-        return found
 
     def set_parameters(self, parameters: Array) -> None:
         """Take a problem's parameters for what follows."""
@@ -98,3 +81,14 @@ def _evaluate(pieces: list[_Piece], variables: Array, found: Array) -> None:
         piece.lanes.run()
         found[place : place + piece.found.size] = piece.found.reshape(-1)
         place += piece.found.size
+
+
+def _pieces(assembly: Assembly, kind: str) -> list[_Piece]:
+    """Return all pieces' functions of a kind on their knots; of both kinds the second result is needed."""
+    found = []
+    for name, users in assembly.users.items():
+        function: InterpretedFunction = getattr(assembly.pieces[name], kind)
+        columns, parameters = assembly.piece_columns[name], assembly.piece_parameters[name]
+        lanes = function.lanes(len(users))
+        found.append(_Piece(lanes, columns, parameters, lanes.outputs[1]))
+    return found

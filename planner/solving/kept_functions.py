@@ -20,13 +20,13 @@ from ...files.cache import Cache
 from ...mathematics.compiling.lanes import OPERATIONS
 from ...robots.description import RobotDescription
 from ..models.coordinates import Coordinates
+from ..models.interpreted import InterpretedFunction, interpreted
 from ..models.symbolic_model import SymbolicModel
 from ..problem.stage_functions import PIECES, StageFunction, make_piece
 from ..task.files import need_planner
 from ..task.plan import PlannedJump
 from ..task.scaling import per_robot
 from ..task.task import Knots
-from .interpreted import InterpretedFunction, interpreted
 
 SOURCES = (
     "models/symbolic_model.py",
@@ -36,7 +36,7 @@ SOURCES = (
     "problem/leg_rows.py",
     "problem/obstacles.py",
 )
-KINDS = ("value", "jacobian", "hessian")
+KINDS = ("value", "gradient", "jacobian", "hessian")
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, steps done and steps in all."""
 
@@ -77,7 +77,7 @@ def content_hash(
     import casadi as ca
 
     digest = hashlib.sha256()
-    for source in (*sources, "solving/interpreted.py", "solving/kept_functions.py"):
+    for source in (*sources, "models/interpreted.py", "solving/kept_functions.py"):
         digest.update((Path(__file__).parents[1] / source).read_bytes())
     kept = robot.model_dump(mode="json", exclude=UNUSED)
     kept["rotors"] = robot.rotor_matrix.tolist()

@@ -156,6 +156,10 @@ class Solver:
         assembly, name, barrier, limit = self._made_of
         return _make_solver(assembly, self._functions, name, barrier, limit)
 
+    def prepare(self) -> None:
+        """Make CasADi's solver if that has not been done."""
+        _ = self._function
+
     def __call__(self, **arguments: Array) -> Any:
         """Solve, with the arguments of CasADi's solvers."""
         return self._function(**arguments)

@@ -120,7 +120,7 @@ def call_bounded(
         RuntimeError: the solver raised; the text is its error's.
     """
     if has_one_thread() or not hasattr(os, "fork"):
-        return bounded(lambda: call_solver(function, arguments), limit)
+        return _bounded_call(function, arguments, limit)
     return _helper.call(function, arguments, limit)
 
 
@@ -225,4 +225,6 @@ def serve() -> None:
 
 
 def _bounded_call(function: Any, arguments: Mapping[str, Array], limit: int) -> Any:
+    if hasattr(function, "prepare"):
+        function.prepare()  # here, or every copy of this process would do it anew
     return bounded(lambda: call_solver(function, arguments), limit)

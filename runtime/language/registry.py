@@ -3,7 +3,7 @@
 There are four kinds of names:
 
 * ``blocks.LandingHeuristic``, ``hal.MujocoRobot``: a package of aloft and a class in it. By
-  convention its file is ``landing_heuristic.py``; otherwise all files are parsed to find it.
+  convention its file is ``landing_heuristic.py``; otherwise the text of all files is searched.
 * ``hopping.SteeredPlan``: an extension, of aloft or of another installed package, and a class in it.
 * ``package.module:Class``: a class of a module beside the graph, in the current folder, or
   wherever Python finds it.
@@ -16,6 +16,7 @@ import difflib
 import inspect
 import re
 import sys
+from abc import ABC
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -25,7 +26,7 @@ from pathlib import Path
 from types import ModuleType
 
 from .block import Block
-from .block_files import blocks_in_folder, blocks_in_packages, files_of
+from .block_files import blocks_in_folder, blocks_in_packages, class_files, files_of
 from .errors import DeclarationError, UnknownBlockError
 from .extensions import SHIPPED, extension, extensions, missing_extension, own_extensions
 from .importing import BlockImportError, import_module, user_module, without_imports
@@ -168,7 +169,7 @@ def _places(folder: Path | None) -> tuple[Path, ...]:
 @cache
 def _own_module(package: str, class_name: str) -> ModuleType | None:
     """Import the module of a package of the core, or of an extension, that has the class: first the
-    one that convention gives, then any."""
+    one that convention gives, then one whose text has it, as long as that is a block to use, then any."""
     if package in PACKAGES:
         folder, imported = _ROOT / package, f"{_OURS}.{package}"
     elif (found := extension(package)) is not None:
@@ -181,8 +182,25 @@ def _own_module(package: str, class_name: str) -> ModuleType | None:
             module = _import_file(path, folder, imported)
             if hasattr(module, class_name):
                 return module
+    if class_name in class_files(folder):
+        module = _import_file(class_files(folder)[class_name], folder, imported)
+        if _is_usable(getattr(module, class_name, None)):
+            return module
     written = _own_blocks().get(f"{package}.{class_name}")
     return _import_file(written, folder, imported) if written is not None else None
+
+
+def _is_usable(found: object) -> bool:
+    """Whether a class is one of those that ``blocks_in_packages`` finds, as far as the class shows."""
+    return (
+        isinstance(found, type)
+        and issubclass(found, Block)
+        and not found.__name__.startswith("_")
+        and ABC not in found.__bases__
+        and not any(getattr(each, "__isabstractmethod__", False) for each in vars(found).values())
+        and bool(found.inputs or found.outputs)
+        and (hasattr(found, "step") or hasattr(found, "emit"))
+    )
 
 
 def _import_file(path: Path, folder: Path, package: str) -> ModuleType:

@@ -77,3 +77,8 @@ def test_a_row_without_a_variable_that_may_change_holds_nothing() -> None:
     others = np.arange(len(matrix)) != 4
     assert found
     assert (matrix @ out)[others] == pytest.approx(wanted[others])
+
+
+def test_more_equations_than_variables_have_no_correction() -> None:
+    matrix = np.random.default_rng(9).standard_normal((4, 3))
+    assert not correct(matrix, np.ones(4), np.ones(3), np.ones(4, dtype=bool), band=8)[1]

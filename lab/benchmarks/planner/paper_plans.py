@@ -6,6 +6,7 @@ follows from the step: the row of an interval is inverse dynamics in its middle.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,8 @@ ON_TOES = [
     {"phase": "flight", "knots": 11},
     {"phase": "landing", "time": 0.5, "knots": 17},
 ]
+SPEEDS = {**WEIGHTS, "joint_velocity": 1.0}
+BOUNDED = {"margins": LEAN, "touchdown_lean": 0.03}
 VARIANTS: dict[str, dict[str, Any]] = {
     "as it was": {"weights": WEIGHTS},
     "steps of half the length": {
@@ -36,22 +39,33 @@ VARIANTS: dict[str, dict[str, Any]] = {
         "knots": {"squat": 16, "thrust": 32, "flight": 56, "landing": 28},
     },
     "steps of 28 ms": {"weights": WEIGHTS, "knots": COARSE},
-    "ten times the weight of speeds": {"weights": {**WEIGHTS, "joint_velocity": 1.0}},
+    "ten times the weight of speeds": {"weights": SPEEDS},
     "bounds on the lean": {"weights": WEIGHTS, "margins": LEAN},
-    "28 ms, weight and bounds": {
-        "weights": {**WEIGHTS, "joint_velocity": 1.0},
-        "knots": COARSE,
-        "margins": LEAN,
-        "touchdown_lean": 0.03,
-    },
+    "28 ms, weight and bounds": {"weights": SPEEDS, "knots": COARSE, **BOUNDED},
     "the same, on its toes at the end of the thrust": {
-        "weights": {**WEIGHTS, "joint_velocity": 1.0},
+        "weights": SPEEDS,
         "phases": ON_TOES,
-        "margins": LEAN,
-        "touchdown_lean": 0.03,
+        **BOUNDED,
+    },
+    "the same, 10 cm ahead": {
+        "weights": SPEEDS,
+        "phases": ON_TOES,
+        **BOUNDED,
+        "distance_x": 0.1,
+    },
+    "10 cm ahead, five times the weight of speeds": {
+        "weights": {**WEIGHTS, "joint_velocity": 5.0},
+        "phases": ON_TOES,
+        **BOUNDED,
+        "distance_x": 0.1,
+    },
+    "a somersault in place, 20 cm up": {
+        "weights": SPEEDS,
+        "rise": 0.2,
+        "rotation": 2.0 * math.pi,
     },
 }
-"""A jump of 12 cm in place; every one changes what its name says."""
+"""A jump of 12 cm in place, unless the name says another; every one changes what its name says."""
 PARTS = ("squat and thrust", "flight", "landing")
 
 

@@ -57,7 +57,7 @@ class _Callback:
                  gap: int) -> None:  # fmt: skip
         self.owner, self.piece, self.parameters = owner, piece, parameters
         self.kept, self.size = rows, int(piece.value.size1_in(0))
-        triplet = piece.jacobian.sparsity_out(2).get_triplet()
+        triplet = piece.jacobian.sparsity_out(1).get_triplet()
         self.row, self.column = (np.array(x, dtype=np.int64) for x in triplet)
         place = np.full(piece.rows, -1)
         place[rows] = np.arange(len(rows))
@@ -79,7 +79,7 @@ class _Callback:
         differentiated = variables.dtype == object
         x = ExtractValue(variables).ravel() if differentiated else variables
         if differentiated:
-            rows, _, jacobian = self.piece.jacobian(x[: self.size], self.parameters)
+            rows, jacobian = self.piece.jacobian(x[: self.size], self.parameters)
         else:
             rows = self.piece.value(x[: self.size], self.parameters)[1]
         value = rows.full().ravel()[self.kept]
@@ -101,7 +101,7 @@ class _Callback:
         result: Any
         if variables.dtype == object:
             x = ExtractValue(variables).ravel()
-            slope = self.piece.jacobian(x, self.parameters)[1].full()
+            slope = self.piece.gradient(x, self.parameters).full()
             value = float(self.piece.value(x, self.parameters)[0])
             result = InitializeAutoDiff(np.array([value]), slope.reshape(1, -1))[0, 0]
         else:
@@ -164,7 +164,7 @@ class SnoptProgram:
         variables, rows = assembly.state_start[k] + take, first + np.arange(len(kept))
         # Rows that do not change (no derivative; in the sagittal plane some do not) are no
         # constraints, and Drake's SNOPT calls a program with such rows infeasible.
-        changing = set(piece.jacobian.sparsity_out(2).get_triplet()[0])
+        changing = set(piece.jacobian.sparsity_out(1).get_triplet()[0])
         moving = np.array([row in changing for row in kept], dtype=bool)
         kept, rows = kept[moving], rows[moving]
         gap = 0
@@ -179,7 +179,7 @@ class SnoptProgram:
             self.x[np.concatenate([variables, after])],
         )  # fmt: skip
         binding.evaluator().SetGradientSparsityPattern(callback.pattern())
-        if piece.jacobian.sparsity_out(1).nnz() and knot.gap == name:
+        if piece.gradient.sparsity_out(0).nnz() and knot.gap == name:
             self.program.AddCost(callback.cost, self.x[variables])
 
     def on_time(self) -> float:

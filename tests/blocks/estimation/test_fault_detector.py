@@ -304,7 +304,7 @@ def test_in_the_thrust_five_times_as_much_is_borne_and_in_flight_anything():
 
 
 def test_gross_errors_are_not_judged_where_their_limit_is_zero():
-    standing = Standing(gross_gravity=0.0, gross_rate=0.0)
+    standing = Standing(gross_gravity=0.0, gross_rate=0.0, gyroscope_error=0.0)
     standing.bench.set("imu", specific_force=-standing.gravity, angular_velocity=5.0)
     assert ended_by(standing) == (50, "")
 
@@ -338,20 +338,141 @@ def test_light_feet_and_the_stand_are_not_judged_by_their_push():
         assert ended_by(standing) == (50, "")
 
 
-def test_no_jump_is_made_with_a_suspect_but_an_encoder():
+@pytest.mark.parametrize("phase", [Phase.SQUAT, Phase.THRUST])
+def test_no_jump_is_made_with_a_suspect_but_an_encoder(phase):
     standing = Standing()
+    standing.bench.set("joints", torque=1.3 * standing.torque)
+    assert standing.run()[0] == Suspect.TORQUE
+    assert ended_by(standing) == (50, "")  # it stands
+    standing.bench.set("phase", phase=phase)
+    ticks, reason = ended_by(standing)
+    assert ticks == 0 and "ended for what is suspected: joint" in reason
+    assert standing.bench.block.metrics()["stopped_for"] == "suspect"
+
+
+@pytest.mark.parametrize("phase", [Phase.STAND, Phase.SQUAT, Phase.LANDING, Phase.RECOVER])
+def test_a_robot_whose_gyroscope_is_suspected_does_not_go_on_standing(phase):
+    standing = Standing()
+    standing.bench.set("phase", phase=phase, time_since_touchdown=1.0)
+    assert ended_by(standing) == (50, "")
+    standing.bench.set("imu", angular_velocity=[0.0, 0.3, 0.0])
+    ticks, reason = ended_by(standing, 100)
+    assert ticks < 100 and "ended for what is suspected: the gyroscope's axis y" in reason
+    standing = Standing(suspects_end=False)
+    standing.bench.set("phase", phase=phase, time_since_touchdown=1.0)
     standing.bench.set("imu", angular_velocity=[0.0, 0.3, 0.0])
     assert standing.run()[0] == Suspect.GYROSCOPE
-    assert ended_by(standing) == (50, "")  # it stands
-    standing.bench.set("phase", phase=Phase.SQUAT)
-    ticks, reason = ended_by(standing)
-    assert ticks == 0 and "no jump with what is suspected: the gyroscope's axis y" in reason
-    assert standing.bench.block.metrics()["stopped_for"] == "suspect"
-    standing = Standing(suspects_end=False)
-    standing.bench.set("phase", phase=Phase.THRUST)
-    standing.bench.set("imu", angular_velocity=[0.0, 0.3, 0.0])
-    standing.run()
     assert ended_by(standing) == (50, "")
+
+
+def turned(standing, angle):
+    """The model's terms where the estimate leans by ``angle`` more [rad], and the feet with it."""
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    terms, base = dict(standing.terms), standing.terms["base_position"]
+    terms["contact_position"] = (terms["contact_position"] - base) @ turn.T + base
+    terms["base_rotation"] = turn @ terms["base_rotation"]
+    return terms
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.1])
+@pytest.mark.parametrize("phase", [Phase.STAND, Phase.SQUAT, Phase.THRUST])
+def test_ground_that_seems_to_turn_ends_the_run_before_lift_off(phase, tilt):
+    standing = Standing(tilt=tilt)
+    standing.bench.set("phase", phase=phase)
+    standing.bench.set("terms", **turned(standing, 0.04))
+    assert ended_by(standing) == (50, ""), "the first plane counts, whatever its slope"
+    standing.bench.set("terms", **turned(standing, 0.085))
+    assert ended_by(standing) == (50, "")
+    standing.bench.set("terms", **turned(standing, 0.1))
+    ticks, reason = ended_by(standing)
+    assert ticks == 2, "gross_time is borne"
+    assert (
+        "the ground under the feet seems to have turned by 3.4 deg since the robot stood up"
+        in reason
+    )
+
+
+def test_ground_of_another_landing_may_lean_otherwise():
+    standing = Standing()
+    assert ended_by(standing) == (50, "")
+    standing.bench.set("phase", phase=Phase.FLIGHT)
+    assert ended_by(standing) == (50, "")
+    standing.bench.set("terms", **turned(standing, 0.2))
+    for phase in (Phase.LANDING, Phase.SQUAT):
+        standing.bench.set("phase", phase=phase)
+        assert ended_by(standing) == (50, "")
+
+
+def test_switches_that_open_under_load_end_squat_and_thrust():
+    for phase, load, ends in (
+        (Phase.SQUAT, 1.0, True), (Phase.THRUST, 1.0, True), (Phase.THRUST, 0.4, False), (Phase.STAND, 1.0, False),
+    ):  # fmt: skip
+        standing = Standing()
+        standing.bench.set("phase", phase=phase)
+        standing.bench.set("load", force=load * standing.robot.weight / 2)
+        standing.bench.set("switches", closed=False)
+        ticks, reason = ended_by(standing)
+        assert ticks == (10 if ends else 50)
+        assert ("no foot switch has been closed for 20 ms" in reason) == ends
+
+
+def test_a_landing_that_no_switch_tells_of_ends_the_flight():
+    for due, closed, ends in (
+        (0.0, False, True),
+        (-0.1, False, True),
+        (0.2, False, False),
+        (0.0, True, False),
+    ):
+        standing = Standing()
+        standing.bench.set("phase", phase=Phase.FLIGHT, stance=False, time_to_touchdown=due)
+        standing.bench.set("switches", closed=[closed, False, False, False])
+        standing.bench.set("imu", specific_force=1.4 * standing.gravity)
+        assert ended_by(standing) == (50, "")
+        standing.bench.set("imu", specific_force=1.6 * standing.gravity)
+        ticks, reason = ended_by(standing)
+        assert ticks == (4 if ends else 50)
+        assert ("the robot has landed, and no foot switch is closed" in reason) == ends
+
+
+def test_a_robot_that_leans_over_fast_after_touchdown_falls():
+    for rate, since, phase, ends in (
+        (4.2, 0.1, Phase.LANDING, True), (4.2, 0.1, Phase.RECOVER, True), (4.2, 0.03, Phase.LANDING, False),
+        (3.8, 0.1, Phase.LANDING, False), (-4.2, 0.1, Phase.LANDING, False),  # it rises
+    ):  # fmt: skip
+        standing = Standing(tilt=0.2)
+        standing.bench.set("phase", phase=phase, stance=False, time_since_touchdown=since)
+        standing.bench.set("contacts", active=False)
+        standing.bench.set("imu", angular_velocity=[0.0, rate, 0.0])
+        ticks, reason = ended_by(standing)
+        assert ticks == (10 if ends else 50), (rate, since, phase)
+        assert (
+            "the robot falls: its gyroscope reads (+0.00, +4.20, +0.00) rad/s" in reason
+        ) == ends
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_sign_of_a_force_across_is_seen_in_the_thrust(axis):
+    read = np.zeros(3)
+    read[axis] = 0.8 * GRAVITY
+    for phase, sign, ends in (
+        (Phase.THRUST, -1.0, True), (Phase.SQUAT, -1.0, True), (Phase.THRUST, 1.0, False), (Phase.LANDING, -1.0, False),
+    ):  # fmt: skip
+        standing = Standing(gross_push=0.0)
+        standing.bench.set("phase", phase=phase)
+        # the legs push across what the base feels, as inverse dynamics without motion have it
+        felt = standing.gravity + read
+        mass = standing.terms["mass_matrix"]
+        jacobian = standing.jacobian
+        force = np.linalg.lstsq(jacobian[:, :6].T, mass[:6, :3] @ felt, rcond=None)[0]
+        torque = mass[6:, :3] @ felt - jacobian[:, 6:].T @ force
+        standing.bench.set("joints", torque=torque)
+        standing.bench.set("command", torque=torque)
+        standing.bench.set("load", force=standing.robot.weight / 2)
+        standing.bench.set("imu", specific_force=standing.gravity + sign * read)
+        ticks, reason = ended_by(standing)
+        assert ticks == (4 if ends else 50), (phase, sign, reason)
+        assert (f"the sign of {'xyz'[axis]} looks wrong" in reason) == ends
 
 
 def test_a_jump_goes_on_with_an_encoder_that_slipped():

@@ -11,6 +11,7 @@ import pytest
 
 from aloft.mathematics.compiling import kept_expansions
 from aloft.mathematics.compiling.equations import expanded_code
+from aloft.mathematics.compiling.expressions import NUMBERS
 from aloft.mathematics.compiling.kept_expansions import EXPANSIONS, kept_expansion
 from aloft.mathematics.compiling.kernel_registry import written_code
 from aloft.mathematics.rotations import skew
@@ -82,3 +83,13 @@ def test_without_a_home_it_is_made(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "nowhere" / "file"))
     (tmp_path / "nowhere").write_text("a file, in which there is no folder")
     assert kept_expansion(skew, written_code(skew)) == expanded_code(skew, written_code(skew))
+
+
+def test_what_is_kept_runs_in_a_module_that_nothing_was_rewritten_in(tmp_path, monkeypatch):
+    text = "import numpy as np\n" + SOURCE.replace("SCALE * x", "np.sign(x)")
+    for _ in range(2):  # the second is from the cache
+        module, out = load(tmp_path, text), np.zeros(2)
+        module.scaled(np.array([-3.0, 2.0]), out)
+        assert out.tolist() == [-1.0, 1.0]
+        assert NUMBERS in vars(module), "a function of it stands for NumPy's"
+        monkeypatch.setattr(kept_expansions, "expanded_code", lambda *_: pytest.fail("made twice"))

@@ -125,6 +125,27 @@ def spin() -> None:
         pass
 
 
+def test_a_solver_is_prepared_here_and_not_by_every_copy(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solver_process, "has_one_thread", lambda: True)
+
+    class Solver:
+        made = 0
+
+        def prepare(self) -> None:
+            self.made += 1
+
+        def __call__(self) -> dict[str, float]:
+            return {"x": float(self.made)}
+
+        def stats(self) -> dict[str, bool]:
+            return {"success": True}
+
+    solver = Solver()
+    ended, answer = call_bounded(solver, {}, 5)
+    assert ended and answer[0].tolist() == [1.0]
+    assert solver.made == 1
+
+
 def test_what_the_call_returns_comes_back() -> None:
     ended, value = bounded(lambda: (np.arange(200_000.0), {"n": 3}), 10)
     assert ended and value[1] == {"n": 3}

@@ -1,17 +1,21 @@
 """Finding blocks by name, importing only what is used, and saying what is nearest."""
 
 import sys
+from collections.abc import Iterator
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
 
+import aloft
 from aloft.blocks.general.arithmetic import Gain
 from aloft.runtime.language import registry
 from aloft.runtime.language.block import Block
-from aloft.runtime.language.errors import UnknownBlockError
+from aloft.runtime.language.block_files import classes_in, files_of
+from aloft.runtime.language.errors import AloftError, UnknownBlockError
 from aloft.runtime.language.importing import BlockImportError, UnknownModuleError
 from aloft.runtime.language.registry import (
+    PACKAGES,
     all_blocks,
     block_name,
     find_block,
@@ -48,6 +52,39 @@ def test_snake_case(name: str, file: str) -> None:
 def test_a_block_in_a_file_of_its_own_and_one_among_others() -> None:
     assert find_block("blocks.Gain") is Gain
     assert find_block("blocks.ContactDetector").__name__ == "ContactDetector"
+
+
+@pytest.fixture
+def nothing_found_yet() -> Iterator[None]:
+    registry._own_module.cache_clear()
+    yield
+    registry._own_module.cache_clear()
+
+
+def test_it_is_found_without_parsing_any_file(
+    monkeypatch: pytest.MonkeyPatch, nothing_found_yet: None
+) -> None:
+    monkeypatch.setattr(registry, "_own_blocks", lambda: pytest.fail("all files are parsed"))
+    assert find_block("blocks.Gain") is Gain
+
+
+def test_what_a_search_finds_is_what_parsing_finds(nothing_found_yet: None) -> None:
+    classes = {
+        f"{package}.{written.name}"
+        for package in PACKAGES
+        for path in files_of(Path(aloft.__file__).parent / package)
+        for written in classes_in(path)
+    }
+    found = {name for name in classes if is_there(name)}
+    assert found == {name for name in known_names() if name in classes}
+    assert {"blocks.LinearFilter", "blocks.LinearSystem", "hal.Robot"} <= classes - found
+
+
+def is_there(name: str) -> bool:
+    try:
+        return bool(find_block(name))
+    except AloftError:
+        return False
 
 
 def test_names_and_blocks_agree() -> None:

@@ -12,6 +12,7 @@ import pytest
 
 from aloft.mathematics.arrays import Array
 from aloft.mathematics.compiling.lanes import OPERATIONS
+from aloft.planner.models.interpreted import _places, interpreted
 from aloft.planner.models.robot_model import model_of
 from aloft.planner.problem import paper_problem, rigid_body_problem
 from aloft.planner.problem.stage_functions import (
@@ -22,7 +23,6 @@ from aloft.planner.problem.stage_functions import (
     StageFunction,
     make_piece,
 )
-from aloft.planner.solving.interpreted import _places, interpreted
 from aloft.planner.solving.kept_functions import KINDS
 from aloft.robots.description import find_robot
 from aloft.robots.welding import welded

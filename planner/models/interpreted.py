@@ -232,6 +232,13 @@ class InterpretedFunction:
         """Return the pattern of a result."""
         return _sparsity(self.outputs[number])
 
+    def lanes(self, count: int) -> Lanes:
+        """Return the function at ``count`` instants, with memory for its arguments and results."""
+        return Lanes(
+            self.program, count,
+            [len(each.rows) for each in self.inputs], [len(each.rows) for each in self.outputs],
+        )  # fmt: skip
+
     def map(self, count: int) -> Any:
         """Return the function of CasADi for ``count`` instants, whose arguments and results are side by side."""
         if count not in self._maps:  # kept here, because CasADi keeps no object of Python
@@ -279,14 +286,10 @@ def _callback() -> Any:
             ca.Callback.__init__(self)
             self._given = [ca.repmat(_sparsity(each), 1, count) for each in function.inputs]
             self._found = [ca.repmat(_sparsity(each), 1, count) for each in function.outputs]
-            lanes = Lanes(
-                function.program, count,
-                [len(each.rows) for each in function.inputs],
-                [len(each.rows) for each in function.outputs],
-            )  # fmt: skip
-            self._lanes, self._lock = lanes, threading.Lock()
+            self._lanes, self._lock = function.lanes(count), threading.Lock()
             self._arguments, self._results = (
-                [_bytes(array) for array in arrays] for arrays in (lanes.inputs, lanes.outputs)
+                [_bytes(array) for array in arrays]
+                for arrays in (self._lanes.inputs, self._lanes.outputs)
             )
             self.construct(f"{function.name()}_{count}", {})
 
