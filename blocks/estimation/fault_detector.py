@@ -70,7 +70,8 @@ class FaultDetector(Block):
     robot in damping, where a fall follows:
 
     * **Before lift-off** a suspect but an encoder ends squat and thrust (``suspects_end``): a robot that still stands need not jump. The
-      gyroscope, by which it balances, ends the run whenever the feet stand.
+      gyroscope, by which it balances, ends the run whenever the feet stand, and switches that are all open end the stand, in which the estimate would
+      take the robot for airborne.
     * An axis of the gyroscope differs by more than ``gross_rate`` from the base's rate over its feet before lift-off; in the thrust, where rates change by
       350 rad/s in a second and either may be late, by five times as much.
     * A reading of the gyroscope beyond ``largest_rate``, which is beyond the range of any, ends the run at once, in every phase: in degrees per second

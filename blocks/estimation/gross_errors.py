@@ -208,7 +208,8 @@ def find_gross_errors(
         state.reading[:] = imu.angular_velocity
     suspected = state.suspect != Suspect.NONE and state.suspect != Suspect.ENCODER
     stands = on_the_ground or landed
-    ends = (jumps and suspected) or (stands and state.suspect == Suspect.GYROSCOPE)
+    blind = phase.phase == Phase.STAND and state.suspect == Suspect.SWITCHES
+    ends = (jumps and suspected) or blind or (stands and state.suspect == Suspect.GYROSCOPE)
     if state.stop == Stop.NONE and ends and params.suspects_end:
         state.stop = Stop.SUSPECT
 
