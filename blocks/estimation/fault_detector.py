@@ -83,7 +83,7 @@ class FaultDetector(Block):
     * In squat and thrust, under the same load, the accelerometer's x or y differs from what the legs push by more than ``gross_across`` weights, and fits with
       the other sign.
     * Before lift-off the plane of the points that stand has turned by more than ``gross_lean`` in the estimate since the robot first stood. Ground does not
-      turn; the attitude is wrong, as by a bias of the gyroscope that is below ``gross_rate``, and the robot is pushed over an edge of its feet.
+      turn; the attitude is wrong, as by a bias of the gyroscope that is below ``gross_rate``, and the robot is pushed over an edge of its feet. With a suspected encoder it is not judged.
     * In squat and thrust no switch is closed for ``gross_open`` under feet that carry more than ``open_load``: its lift-off would be missed.
     * In flight, from 50 ms before the touchdown is due, the accelerometer's z reads more than ``gross_landing`` while no switch is closed: the robot has landed
       with switches that stay open, and its legs still hold the pose of the flight.

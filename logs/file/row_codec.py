@@ -152,10 +152,11 @@ def _words(data: bytes, begin: int, end: int) -> NDArray[np.uint8]:
     low, high = begin // 8, -(-end // 8)
     here = changing[low:high]
     moving = (np.cumsum(changing) - 1)[low:high][here]  # among the columns that change
-    if len(moving) == changes:
-        moving = slice(None)  # no copy of all of them
     steady = (np.cumsum(~changing) - 1)[low:high][~here]
-    columns = _columns(planes.reshape(8, changes, count)[:, moving])
+    of_planes = planes.reshape(8, changes, count)
+    columns = _columns(
+        of_planes if len(moving) == changes else of_planes[:, moving]
+    )  # all without a copy
     if here.all():
         return np.ascontiguousarray(columns).view(np.uint8)
     found = np.empty((count, high - low), np.int64)
