@@ -407,7 +407,7 @@ def read_tuning(node: MapNode, labels: Labels, problems: Problems) -> Tuning | N
             )
     race = node.get("race")
     races = plain(race.value) if race else False
-    if not isinstance(races, bool):
+    if race and not isinstance(races, bool):
         wrong_kind(race.value, "'race'", "true or false", problems)
     return Tuning(
         search.seeds, search.draws, search.seed, search.cells, search.sets,

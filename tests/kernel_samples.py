@@ -220,7 +220,7 @@ UNUSED = {
     "aloft.mathematics.banded_system.without_products": (0.7, NORMAL(3), NORMAL(3)),
     "aloft.mathematics.banded_system.smallest_correction": (
         CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3),
-        np.array([3]), 1e-12, np.zeros((3, 3)), *np.zeros((2, 3), dtype=np.int64), NORMAL(3),
+        np.array([3]), 1e-12, np.zeros((3, 3)), np.array([1, 2, 2]), np.zeros(3, dtype=np.int64), NORMAL(3),
         np.zeros(4), np.zeros(1, dtype=np.bool_), np.zeros(1, dtype=np.bool_),
     ),
     "aloft.mathematics.ground_surface.height_of_slope": (

@@ -49,18 +49,21 @@ ROOMS = (
 HOT = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
 PLAIN = {"Array", "Flags", "Indices", "float", "int", "bool", *vars(arrays)} - {"Any"}
 NOT_HOT = {
+    "blocks.estimation.gross_errors.axes_look_like": "for the text of a fault, once",
     "blocks.estimation.gross_errors.gravity_looks_like": "for the text of a fault, once",
     "blocks.estimation.gross_errors.looks_like": "for the text of a fault, once",
     "blocks.estimation.gross_errors.push_looks_like": "for the text of a fault, once",
     "blocks.estimation.gross_errors.vector_text": "for the text of a fault, once",
     "blocks.general.table_playback._sides": "before a run, when the table is read",
     "hal.log.columns.at_times": "before a run, when the log is read",
+    "hal.log.columns.last_rows": "before a run, when the log is read",
     "hal.log.columns.mean_over": "before a run, when the log is read",
     "hal.log.columns.repeats_of": "before a run, when the log is read",
     "hal.log.columns.with_hysteresis": "before a run, when the log is read",
     "hal.log.played_log.quaternion_of_rpy": "before a run, when the log is read",
     "hal.log.played_log.rotation_of": "before a run, when the log is read",
     "hal.log.played_log.rotation_of_rpy": "before a run, when the log is read",
+    "mathematics.compiling.foreign_call._caller_module": "makes a module of LLVM's language",
     "mathematics.compiling.lanes._all_lanes": "of a constant, in the code that is made",
     "mathematics.compiling.numpy_numbers.demand": "its name stands for a test that the compiler writes",
     "mathematics.quadratic_program._sparse": "for solvers of other packages, in plain Python",

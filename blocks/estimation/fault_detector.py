@@ -70,7 +70,8 @@ class FaultDetector(Block):
     robot in damping, where a fall follows:
 
     * **Before lift-off** a suspect but an encoder ends squat and thrust (``suspects_end``): a robot that still stands need not jump. The
-      gyroscope, by which it balances, ends the run whenever the feet stand.
+      gyroscope, by which it balances, ends the run whenever the feet stand, and switches that are all open end the stand, in which the estimate would
+      take the robot for airborne.
     * An axis of the gyroscope differs by more than ``gross_rate`` from the base's rate over its feet before lift-off; in the thrust, where rates change by
       350 rad/s in a second and either may be late, by five times as much.
     * A reading of the gyroscope beyond ``largest_rate``, which is beyond the range of any, ends the run at once, in every phase: in degrees per second
@@ -82,7 +83,7 @@ class FaultDetector(Block):
     * In squat and thrust, under the same load, the accelerometer's x or y differs from what the legs push by more than ``gross_across`` weights, and fits with
       the other sign.
     * Before lift-off the plane of the points that stand has turned by more than ``gross_lean`` in the estimate since the robot first stood. Ground does not
-      turn; the attitude is wrong, as by a bias of the gyroscope that is below ``gross_rate``, and the robot is pushed over an edge of its feet.
+      turn; the attitude is wrong, as by a bias of the gyroscope that is below ``gross_rate``, and the robot is pushed over an edge of its feet. With a suspected encoder it is not judged.
     * In squat and thrust no switch is closed for ``gross_open`` under feet that carry more than ``open_load``: its lift-off would be missed.
     * In flight, from 50 ms before the touchdown is due, the accelerometer's z reads more than ``gross_landing`` while no switch is closed: the robot has landed
       with switches that stay open, and its legs still hold the pose of the flight.

@@ -35,7 +35,7 @@ class Stop(IntEnum):
     PUSH = 3
     """In squat, thrust or landing the accelerometer does not read what the legs push."""
     SUSPECT = 4
-    """A suspect was found, and the robot was about to jump; or it is the gyroscope, by which it balances."""
+    """A suspect was found, and the robot was about to jump; or it stands by what it was."""
     LEAN = 5
     """Before lift-off the ground under the feet seems to tip: the attitude is wrong."""
     SWITCHES = 6
@@ -126,7 +126,7 @@ class FaultDetectorParams(Parameters):
     falling_time: float = parameter(0.02, unit="s", ge=0.0, text="see `falling_rate`")
     suspects_end: bool = parameter(
         True,
-        text="whether a suspect other than an encoder ends the run in squat and thrust, and the gyroscope whenever the robot stands",
+        text="whether a suspect other than an encoder ends the run in squat and thrust, switches in the stand, and the gyroscope whenever feet stand",
     )
     gross_time: float = parameter(
         0.004,

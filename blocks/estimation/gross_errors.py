@@ -185,7 +185,8 @@ def find_gross_errors(
         (jumps or landed) and rigid and heavy, pushed, imu, terms, phase, state, params, constants, scratch,
     )  # fmt: skip
     find_gross_force_across(jumps and heavy, imu, joints, terms, state, params, constants, scratch)
-    find_lean(on_the_ground, rigid, terms, state, params, constants, scratch)
+    trusted = rigid and state.suspect != Suspect.ENCODER  # by the encoders the ground leans
+    find_lean(on_the_ground, trusted, terms, state, params, constants, scratch)
     if persists(
         state, _OPEN, jumps and heavy and open and params.gross_open > 0.0, constants.gross_ticks[2]
     ):
@@ -208,7 +209,8 @@ def find_gross_errors(
         state.reading[:] = imu.angular_velocity
     suspected = state.suspect != Suspect.NONE and state.suspect != Suspect.ENCODER
     stands = on_the_ground or landed
-    ends = (jumps and suspected) or (stands and state.suspect == Suspect.GYROSCOPE)
+    blind = phase.phase == Phase.STAND and state.suspect == Suspect.SWITCHES
+    ends = (jumps and suspected) or blind or (stands and state.suspect == Suspect.GYROSCOPE)
     if state.stop == Stop.NONE and ends and params.suspects_end:
         state.stop = Stop.SUSPECT
 

@@ -111,6 +111,9 @@ class LogRobot(Robot):
         self.last_tick = len(self.rows.imu) - 1
         self.period_ticks = self.context.period_ticks
         # what a log does not tell stays zero from here on
+        for signal in (self.health, self.truth):
+            for view in signal.views().values():
+                view[...] = 0
         self.health.state = DrivePhase.DRIVING
         self.health.condition[:] = HEALTHY
 

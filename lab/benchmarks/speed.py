@@ -57,6 +57,29 @@ print(json.dumps({"load": load, "start": start, "growth": start / 4900 / (few / 
 """Loads and starts chains of blocks; prints the processor times [s] and the growth of a block's."""
 
 
+NEW_TASKS = """
+import json
+from aloft.planner.solving.solve import solve_jump
+from aloft.planner.solving.solver_process import cpu_time
+from aloft.planner.task.task import make_task
+from aloft.robots.description import find_robot
+
+robot = find_robot("bruce")
+
+def measure(**wanted):
+    task = make_task({"name": "new", "robot": "bruce", "rise": 0.11, **wanted})
+    begin = cpu_time()
+    solve_jump(task, robot)
+    return cpu_time() - begin
+
+def least(**wanted):  # the first one derives functions and makes the solver
+    return min(measure(**wanted) for _ in range(4))
+
+print(json.dumps({"sagittal": least(distance_x=0.1), "full": least(distance_x=0.1, twist=0.3)}))
+"""
+"""Plans new tasks without a plan of a near one; prints the processor times [s]."""
+
+
 @dataclass(frozen=True)
 class Case:
     """A process that is measured.
@@ -103,9 +126,17 @@ CASES = (
         {"jump of a new height, planned and run": "time"}, forgets=("plans", "checked"),
     ),
     Case(
-        _aloft("bench", "online_plans", "--count", "20", "--json"),
-        {f"plan in the loop, {kind}, median": f"plan in the loop, {kind}, median" for kind in ("straight", "all coordinates")},
+        _aloft("bench", "online_plans", "--count", "40", "--json"),
+        {
+            name: name
+            for kind in ("straight", "all coordinates")
+            for name in (f"plan in the loop, {kind}, median", f"plan in the loop, {kind}, 99 %")
+        },
         codes=(0, 1), long=True,
+    ),
+    Case(
+        ("-c", NEW_TASKS),
+        {"plan of a new task, sagittal": "sagittal", "plan of a new task, all coordinates": "full"}, long=True,
     ),
     Case(
         _aloft("jump", "--robot", "ROBOT", "--rise", "10cm", "--no-record", "--json"),

@@ -46,20 +46,21 @@ def pack(first: int, rows: NDArray[np.uint8]) -> bytes:
     words = rows if size % 8 == 0 else np.pad(rows, ((0, 0), (0, -size % 8)))
     whole = words.view(np.int64)
     changing = (whole != whole[:1]).any(axis=0)
-    columns = np.ascontiguousarray(whole[:, changing].T)
+    columns = np.compress(changing, whole, axis=1)
     for _ in range(ORDER):
-        columns[:, 1:] -= columns[:, :-1]
+        columns[1:] -= columns[:-1].copy()
     signs = columns >> 63
     columns <<= 1
     columns ^= signs
     start = np.concatenate([np.packbits(changing), whole[0, ~changing].view(np.uint8)])
+    changes = columns.shape[1]
     flat = np.empty(len(start) + columns.nbytes, np.uint8)
     flat[: len(start)] = start
-    planes = flat[len(start) :].reshape(8, len(columns), count)
-    planes[:] = columns.view(np.uint8).reshape(len(columns), count, 8).transpose(2, 0, 1)
+    planes = flat[len(start) :].reshape(8, changes, count)
+    planes[:] = columns.view(np.uint8).reshape(count, changes, 8).transpose(2, 1, 0)
     packed: bytes = pa.Codec("zstd", compression_level=LEVEL).compress(flat, asbytes=True)
     head = _HEAD.pack(_MARK, count, size, first, crc32(rows.data))
-    return head + _SIZES.pack(len(columns), len(flat)) + packed
+    return head + _SIZES.pack(changes, len(flat)) + packed
 
 
 def unpack(data: bytes) -> tuple[int, NDArray[np.uint8]]:
@@ -152,17 +153,23 @@ def _words(data: bytes, begin: int, end: int) -> NDArray[np.uint8]:
     here = changing[low:high]
     moving = (np.cumsum(changing) - 1)[low:high][here]  # among the columns that change
     steady = (np.cumsum(~changing) - 1)[low:high][~here]
-    found = np.empty((high - low, count), np.int64)
-    found[~here] = constant.view(np.int64)[steady, None]
-    found[here] = _columns(planes.reshape(8, changes, count)[:, moving])
-    return np.ascontiguousarray(found.T).view(np.uint8)
+    of_planes = planes.reshape(8, changes, count)
+    columns = _columns(
+        of_planes if len(moving) == changes else of_planes[:, moving]
+    )  # all without a copy
+    if here.all():
+        return np.ascontiguousarray(columns).view(np.uint8)
+    found = np.empty((count, high - low), np.int64)
+    found[:, ~here] = constant.view(np.int64)[steady]
+    found[:, here] = columns
+    return found.view(np.uint8)
 
 
 def _columns(planes: NDArray[np.uint8]) -> Words:
-    """Join the columns (n, ticks) from their bytes (8, n, ticks)."""
-    zigzag = np.ascontiguousarray(planes.transpose(1, 2, 0)).view(np.uint64)[:, :, 0]
+    """Join the columns (ticks, n) from their bytes (8, n, ticks)."""
+    zigzag = np.ascontiguousarray(planes.transpose(2, 1, 0)).view(np.uint64)[:, :, 0]
     signs = -(zigzag & np.uint64(1)).view(np.int64)
     columns: Words = (zigzag >> np.uint64(1)).view(np.int64) ^ signs
     for _ in range(ORDER):
-        columns = np.cumsum(columns, axis=1)
+        columns = np.cumsum(columns, axis=0)
     return columns

@@ -267,7 +267,7 @@ def _evaluate(
         # CasADi's own call takes as long as ten of the lanes, but these are not made for one plan.
         _evaluators[key] = model, ()
         states, torques = (
-            np.array(function.map(len(q))(*(array.T for array in arrays))).T
+            np.array(function.map(len(q))(*(array.T for array in arrays))).T.copy()
             for function, arrays in zip(functions, given, strict=True)
         )
     else:

@@ -224,7 +224,9 @@ def serve() -> None:
             answers.flush()
 
 
-def _bounded_call(function: Any, arguments: Mapping[str, Array], limit: int) -> Any:
+def _bounded_call(
+    function: Any, arguments: Mapping[str, Array], limit: int
+) -> tuple[bool, Answer | None]:
     if hasattr(function, "prepare"):
         function.prepare()  # here, or every copy of this process would do it anew
     return bounded(lambda: call_solver(function, arguments), limit)

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import ConfigDict
 
 from ..language.block import Block
-from ..language.parameters import takes_none
+from ..language.parameters import Parameters, group_of, takes_none
 from ..language.registry import all_blocks
 from ..transports.registry import endpoint_pattern
 from .reading.graph_file import UNDERSCORED, CommonKeys, GraphSections, GraphValues, SubgraphKeys
@@ -68,9 +68,18 @@ def schema_text() -> str:
     return json.dumps(graph_schema(), indent=1) + "\n"
 
 
+def _build(model: type[Parameters]) -> None:
+    """Build the validators of a model and of its groups: pydantic 2.7 writes no default of a group without them."""
+    for info in model.model_fields.values():
+        if (group := group_of(info)) is not None:
+            _build(group)
+    model.model_rebuild()
+
+
 def _particular_schema(name: str, block_type: type[Block], definitions: Schema) -> Schema:
     """Return the part of the schema that only blocks of this type have: their parameters and
     inputs."""
+    _build(block_type.Params)
     model = block_type.Params.model_json_schema()
     for inner, schema in model.pop("$defs", {}).items():
         inside = definitions[f"{name}.{inner}"] = _relocate(schema, name)

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from aloft.cli import main
+from aloft.cli import run
 
 from ..counting import copy_counting
 
@@ -47,7 +47,7 @@ def outcome(*arguments: str, columns: int = 160) -> subprocess.CompletedProcess[
     ):
         patch.setattr(sys, "argv", ["aloft", *arguments])
         patch.setenv("COLUMNS", str(columns))
-        main()
+        run()
     assert isinstance(left.value.code, int)
     return subprocess.CompletedProcess(
         arguments, left.value.code, output.getvalue(), errors.getvalue()

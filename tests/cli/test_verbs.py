@@ -291,8 +291,8 @@ def test_a_bug_does_not_look_like_a_fall(
 def test_a_verb_imports_no_other_verbs_file() -> None:
     code = (
         "import sys; sys.argv = ['aloft', 'check', 'nothing.yaml']\n"
-        "from aloft.cli import main\n"
-        "try: main()\n"
+        "from aloft.cli import run\n"
+        "try: run()\n"
         "except SystemExit: pass\n"
         "print(sorted(m for m in sys.modules if m in ('aloft.cli.run', 'aloft.cli.plan')))"
     )

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from functools import lru_cache
 from math import prod
 from typing import Any
 
-from ....files.nodes import ListNode, Node, ScalarNode, from_plain, plain
+from ....files.nodes import ListNode, Node, ScalarNode, changed, from_plain, plain
 from ....robots.description import RobotDescription
 from ...language.block import Block
 from ...language.flat_graph import FlatBlock, FlatWire, WireElement
@@ -77,7 +76,7 @@ class Widths:
         """Return the block with the widths that were found."""
         for name, width in self._found.get(flat.path, {}).items():
             node = from_plain(width, flat.where)
-            flat = replace(flat, parameters=flat.parameters.assign((name,), node, flat.where))
+            flat = changed(flat, parameters=flat.parameters.assign((name,), node, flat.where))
         return flat
 
     def _settle(self, path: str) -> bool:

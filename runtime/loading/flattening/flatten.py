@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ....files.document import read_file, read_mapping
-from ....files.nodes import Entry, MapNode, Node, ScalarNode, plain
+from ....files.nodes import Entry, MapNode, Node, ScalarNode, changed, plain
 from ....files.problems import Code, Position, Problems
 from ...language.flat_graph import FlatBlock, FlatGraph, FlatWire
 from ..reading.files import PREFIX, FileTree, Stack, files_like, is_another_kind
@@ -403,7 +403,7 @@ def _finish(draft: _GraphDraft, resolver: Resolver) -> FlatBlock:
             wires[name] = resolved
         elif resolved is None:
             excused.append(name)
-    return replace(draft.block, wires=wires, excused=tuple(excused))
+    return changed(draft.block, wires=wires, excused=tuple(excused))
 
 
 def _has_blocks(file: WrittenGraph) -> bool:

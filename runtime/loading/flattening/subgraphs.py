@@ -9,7 +9,17 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
-from ....files.nodes import ListNode, MapNode, Node, ScalarNode, kind, plain, text_of, texts_of
+from ....files.nodes import (
+    ListNode,
+    MapNode,
+    Node,
+    ScalarNode,
+    changed,
+    kind,
+    plain,
+    text_of,
+    texts_of,
+)
 from ....files.problems import Code, Position, Problems, fix_for_key, listing, nearest
 from ...language.flat_graph import FlatBlock, FlatWire, WireElement, WireSlice
 from ...language.selection import WHOLE, Selection
@@ -140,7 +150,7 @@ class Resolver:
                 item = WireElement(start.where, inner, selection)
                 return replace(total, slices=(WireSlice("", start.where, (item,)),))
             else:
-                return replace(total, source=link.source)
+                return changed(total, source=link.source)
             if following is None or isinstance(following, str):
                 return following
             link = following

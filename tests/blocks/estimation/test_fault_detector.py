@@ -365,6 +365,18 @@ def test_a_robot_whose_gyroscope_is_suspected_does_not_go_on_standing(phase):
     assert ended_by(standing) == (50, "")
 
 
+def test_a_robot_whose_switches_are_open_stands_on_after_a_landing_only():
+    for phase, ends in ((Phase.STAND, True), (Phase.RECOVER, False)):
+        standing = Standing()
+        standing.bench.set("phase", phase=phase, time_since_touchdown=1.0)
+        standing.bench.set("switches", closed=False)
+        ticks, reason = ended_by(standing, 100)
+        assert ticks == (76 if ends else 100) and standing.state.suspect == Suspect.SWITCHES
+        assert (
+            "ended for what is suspected: no foot switch has been closed for 150 ms" in reason
+        ) == ends
+
+
 def turned(standing, angle):
     """The model's terms where the estimate leans by ``angle`` more [rad], and the feet with it."""
     c, s = np.cos(angle), np.sin(angle)
@@ -483,6 +495,8 @@ def test_a_jump_goes_on_with_an_encoder_that_slipped():
     position[3] += 0.1
     standing.bench.set("joints", position=position)
     assert ended_by(standing) == (50, "") and standing.state.suspect == Suspect.ENCODER
+    standing.bench.set("terms", **turned(standing, 0.1))  # as the encoder has it
+    assert ended_by(standing) == (50, "")
 
 
 @pytest.mark.parametrize("phase", [Phase.STAND, Phase.THRUST, Phase.FLIGHT, Phase.LANDING])
