@@ -93,7 +93,7 @@ class V(Signal):
 
 @numba.njit
 def product(a):
-    a[:] = np.eye(3) @ a
+    a[0] = np.dot(a, a)
 
 
 class Solving(Block):
