@@ -167,6 +167,10 @@ class ExpressionTranslator:
             return self._fixed[name]
         if name not in self._rooms:
             raise NotCompilable(f"{name} is read before it is assigned")
+        if len(self._rooms[name]) != len(leaves(self._types[name])):
+            raise NotCompilable(
+                f"{name} is another part of an array in each round; copy it, as in {name} = {name}.copy()"
+            )
         value = self._code.load(self._types[name], self._rooms[name])
         if name not in self._only_counters:
             return value
