@@ -164,22 +164,20 @@ class Judge:
 
     def _by_numpy(self, module: Any, name: str) -> Iterator[Judged]:
         """Run a kernel as it is written, and in plain Python with its loops; yield the runs that are right."""
-        from ..mathematics.compiling.expressions import EquationError
-        from ..mathematics.kernel import expand
+        from ..mathematics.compiling.rehearsal import mistake_in
 
         counts, refusals = self.tally.counts, self.tally.refusals
         function = getattr(module, name)
         try:
-            expand(function)
-        except EquationError as error:
-            counts["refused"] += 1
-            text = str(error)
-            if not re.search(r"drawn_\d+_\d+\.py:\d+: kernel", text):
-                self._wrong(module, name, f"refused without a line: {text}")
-            refusals[re.sub(r".*?: kernel \S+: ", "", text)[:60]] += 1
-            return
+            refusal = mistake_in(function, arguments_for(module, 1000 * self._seed), run=False)
         except Exception as error:  # noqa: BLE001  # whatever it is, it is a mistake of ours
             self._wrong(module, name, f"{type(error).__name__}: {error}")
+            return
+        if refusal:
+            counts["refused"] += 1
+            if not re.search(r"drawn_\d+_\d+\.py:\d+: kernel", refusal):
+                self._wrong(module, name, f"refused without a line: {refusal}")
+            refusals[re.sub(r".*?: kernel \S+: ", "", refusal)[:60]] += 1
             return
         for run in range(self._runs):
             arguments = arguments_for(module, 1000 * self._seed + run)

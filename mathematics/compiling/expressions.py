@@ -179,7 +179,10 @@ class Expressions:
             (*[1] * (rank - len(a)), *a), (*[1] * (rank - len(b)), *b), strict=True
         ):
             if None not in (one, other) and one != other and not (repeats(one) or repeats(other)):
-                raise self._error(node, f"shapes {shown(a)} and {shown(b)} do not fit together")
+                text = f"shapes {shown(a)} and {shown(b)} do not fit together"
+                if 1 in (one, other):
+                    text += "; one element is repeated only where its array's declaration says that it is one: take it by its index"
+                raise self._error(node, text)
             if repeats(one) or repeats(other):
                 made.append(other if repeats(one) else one)
             else:  # what is certain before what may be cut, and that before what is open

@@ -1,8 +1,9 @@
 """Functions of Numba that kernels call: each gets a C function of a kernel's own convention.
 
 A kernel calls ``i32 symbol(leaves of the arguments..., ptr to each result)``. Numba compiles that function once;
-its object file is kept beside those of kernels, so a later process compiles nothing. Plain Python calls
-the ``@numba.njit`` function itself, so all tiers run Numba's machine code.
+its object file is kept beside those of kernels, so a later process compiles nothing; only code that needs objects of
+Python, such as what ``print`` writes, is made anew. Plain Python calls the ``@numba.njit`` function itself, so all
+tiers run Numba's machine code.
 """
 
 from __future__ import annotations
@@ -10,9 +11,11 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
+import re
 import textwrap
 from collections.abc import Iterator
 from importlib.metadata import version
+from itertools import pairwise
 from types import CodeType
 from typing import Any
 
@@ -27,6 +30,10 @@ from .machine_code import linked, object_of, tools
 
 SYMBOL = "numba_"
 """Beginning of the names of the made functions; 32 hexadecimal digits follow."""
+
+NO_CODE = "does not compile"
+_OBJECTS = re.compile(r"load ptr, ptr @_ZN08NumbaEnv")
+"""In the code of a function that needs objects of Python, which Numba keeps in its own process."""
 
 _addresses: dict[str, int] = {}
 _alive: list[Any] = []
@@ -79,7 +86,7 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
 
 def source_of(function: Any) -> str:
     """Return what the machine code of a function depends on, in all that it calls."""
-    texts = [f"numba {version('numba')}"]
+    texts = [f"numba {version('numba')}, with its objects"]
     for each in functions_below(function):
         texts.append(
             f"{name_of(each)} {sorted(each.targetoptions.items())!r} {each.py_func.__defaults__!r}"
@@ -212,10 +219,7 @@ def _make(function: Any, signature: tuple[ArgumentType, ...]) -> Translated:
     try:
         function.compile(kinds)
     except Exception as error:  # whatever Numba says
-        lines = [line for line in str(error).splitlines() if line.strip()]
-        raise CompileError(
-            f"numba function {name} does not compile: {' '.join(lines[:3])[:300]}"
-        ) from error
+        raise CompileError(f"numba function {name} {NO_CODE}: {_reason(error)}") from error
     result = function.overloads[kinds].signature.return_type
     several = isinstance(result, types.BaseTuple)
     parts = () if result is types.none else tuple(result) if several else (result,)
@@ -225,12 +229,14 @@ def _make(function: Any, signature: tuple[ArgumentType, ...]) -> Translated:
     symbol = f"{SYMBOL}{digest.hexdigest()}"
     if not store.holds(symbol.removeprefix(SYMBOL)):
         entry = _entry(function, signature, returns, several)
-        code, needs = object_of(entry.inspect_llvm(), entry.native_name, symbol)
-        store.save(
-            symbol.removeprefix(SYMBOL), json.dumps({"needs": needs}).encode() + b"\n" + code
-        )
         _alive.append(entry)
-        _addresses.setdefault(symbol, linked_address(code, symbol, needs))
+        if _OBJECTS.search(entry.inspect_llvm()):
+            _addresses[symbol] = entry.address
+        else:
+            code, needs = object_of(entry.inspect_llvm(), entry.native_name, symbol)
+            kept = json.dumps({"needs": needs}).encode() + b"\n" + code
+            store.save(symbol.removeprefix(SYMBOL), kept)
+            _addresses.setdefault(symbol, linked_address(code, symbol, needs))
     operands = [
         leaf + (" zeroext" if leaf == "i1" else "") for kind in signature for leaf in leaves(kind)
     ]
@@ -240,6 +246,17 @@ def _make(function: Any, signature: tuple[ArgumentType, ...]) -> Translated:
     )
     declared = {symbol: f"declare i32 @{symbol}({takes})"}
     return Translated(symbol, "", made, True, {}, declared, function)
+
+
+def _reason(error: Exception) -> str:
+    """Return why Numba does not compile a function, with the line: the first reason of its own, without its candidates."""
+    text = re.sub(r"\x1b\[\d*m", "", str(error))
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    lines = [line for line in lines if not line.startswith("Failed in nopython mode pipeline")]
+    own = [after for line, after in pairwise(lines) if line.endswith("raised a specific error:")]
+    place = re.search(r'File "(.+?)", line (\d+):', text)
+    where = f"line {place[2]} of {place[1]}: " if place else ""
+    return where + (own[0] if own else " ".join(lines[:2]))[:300]
 
 
 def linked_address(code: bytes, symbol: str, needs: list[str]) -> int:

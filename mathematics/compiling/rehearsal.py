@@ -16,13 +16,14 @@ import numpy as np
 
 from ..kernel import expand
 from .arguments import error_record, type_of
+from .compile_calls import compile_calls
 from .equations import EquationError, check_equations
 from .failures import FAILURES
 from .fingerprint import numba_functions
 from .kernel_call import KernelCall
 from .kernel_registry import written_code
 from .kinds import ArrayKind, Kind, RecordKind, RuntimeSize, argument_kinds
-from .numba_calls import unseeded
+from .numba_calls import NO_CODE, unseeded
 from .translate import Translator
 
 MOST_LINES = 100_000
@@ -51,10 +52,9 @@ def mistake_in(kernel: Callable[..., Any], arguments: Sequence[Any], *, run: boo
         check_equations(kernel, kinds)
     except EquationError as error:
         return str(error)
-    drawing = _draws(kernel)
-    if drawing or not run or numba_functions(kernel):
-        return drawing
-    return _run_plainly(kernel, arguments)
+    if numba_functions(kernel):
+        return _mistake_of_numba(kernel, arguments)
+    return _run_plainly(kernel, arguments) if run else ""
 
 
 def explained(error: BaseException, calls: Iterable[KernelCall]) -> BaseException | None:
@@ -124,17 +124,18 @@ def _kind_of(value: Any, declared: Kind) -> Kind:
     return declared
 
 
-def _draws(kernel: Any) -> str:
-    """Return what is wrong with a kernel whose functions of Numba draw random numbers."""
+def _mistake_of_numba(kernel: Any, arguments: Sequence[Any]) -> str:
+    """Return what is wrong with a kernel that calls functions of Numba: random numbers, or what Numba does not compile."""
+    code = written_code(kernel)
+    place = f"{code.co_filename}:{code.co_firstlineno}: kernel {kernel.__qualname__}: "
     for each in numba_functions(kernel):
         if drawing := unseeded(each):
-            code = written_code(kernel)
             return (
-                f"{code.co_filename}:{code.co_firstlineno}: kernel {kernel.__qualname__}: numba function {drawing} "
-                "draws random numbers without a seed, so no run could be repeated; let a block such as "
-                "blocks.WhiteNoise draw them"
+                f"{place}numba function {drawing} draws random numbers without a seed, so no run could be repeated; let a "
+                "block such as blocks.WhiteNoise draw them"
             )
-    return ""
+    reason = compile_calls([KernelCall(kernel, *arguments)])  # what is compiled is kept for the run
+    return place + reason if f" {NO_CODE}: " in reason else ""
 
 
 def _run_plainly(kernel: Callable[..., Any], arguments: Sequence[Any]) -> str:

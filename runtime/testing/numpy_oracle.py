@@ -24,6 +24,7 @@ from ...mathematics.compiling.kernel_registry import (
     written_code,
 )
 from ...mathematics.compiling.kinds import ArrayKind, Kind, RecordKind, argument_kinds
+from ...mathematics.compiling.numba_calls import is_numba, names_read
 
 DISTURBANCE = 2.0**-44
 """By how much numbers are changed, relative to each, to see how far rounding may go."""
@@ -107,8 +108,10 @@ def by_numpy(kernel: Any, arguments: Sequence[Any]) -> None:
 @lru_cache(64)
 def _as_written(kernel: Any) -> Callable[..., Any] | None:
     """Return a kernel as it is written, or None if NumPy cannot take it."""
-    if kernel.__closure__ is not None or numba_functions(kernel):
+    if kernel.__closure__ is not None:
         return None
+    if any("random" in names_read(each) for each in numba_functions(kernel)):
+        return None  # Numba has a stream of its own
     return _written(kernel, {})
 
 
@@ -200,6 +203,8 @@ def _written(kernel: Any, made: dict[int, Callable[..., Any]]) -> Callable[..., 
         value = names.get(name)
         if is_kernel(value):
             names[name] = _written(value, made)
+        elif is_numba(value):
+            names[name] = _written_for_numba(value, made)
         elif isinstance(value, types.ModuleType) and value is math:
             names[name] = _MATH
         elif isinstance(value, types.ModuleType):
@@ -207,6 +212,19 @@ def _written(kernel: Any, made: dict[int, Callable[..., Any]]) -> Callable[..., 
     names |= _BUILTINS
     names.update({name: np.cross for name, value in names.items() if value is cross})
     return made[id(kernel)]
+
+
+def _written_for_numba(function: Any, made: dict[int, Callable[..., Any]]) -> Callable[..., Any]:
+    """Return a function of Numba as it is written, which calls others as they are written."""
+    if id(function) not in made:
+        written = function.py_func
+        names = dict(written.__globals__)
+        made[id(function)] = types.FunctionType(
+            written.__code__, names, written.__name__, written.__defaults__, written.__closure__
+        )
+        called = {name: names.get(name) for name in written.__code__.co_names}
+        names |= {n: _written_for_numba(each, made) for n, each in called.items() if is_numba(each)}
+    return made[id(function)]
 
 
 class _Written:

@@ -45,8 +45,13 @@ def test_parts_on_a_busy_machine_do_not_take_each_other_for_gone(
     result = run_for_json(
         "run", "graph.yaml", "--local", "--no-record", "--set", "duration=4 s", code=0
     )
-    assert result["success"] and result["reason"] in ("ran to its end", "")
-    assert all(part["ticks"] == 800 for part in result["machines"].values())
+    ticks = {name: part["ticks"] for name, part in result["machines"].items()}
+    assert result["success"] and max(ticks.values()) == 800
+    if links == "{}":
+        assert result["reason"] in ("ran to its end", "") and set(ticks.values()) == {800}
+    else:  # whichever runs free and is first at its end ends the others, in order
+        ends = ("ran to its end", "", *(f"machine {name!r} has ended its run" for name in ticks))
+        assert result["reason"] in ends
 
 
 def test_a_full_folder_of_shared_memory_harms_no_run(here: Path) -> None:

@@ -46,6 +46,30 @@ def makes(a: Any) -> Any:
     return a * 2.0
 
 
+@numba.njit
+def matches(a: Any) -> None:
+    try:
+        a[0] = 1.0 / a[1]
+    except ZeroDivisionError:
+        a[0] = 2.0
+
+
+@numba.njit
+def prints(x: float) -> float:
+    print("x is", x)
+    return 2.0 * x
+
+
+@kernel
+def catches(y: Vector3) -> None:
+    matches(y)
+
+
+@kernel
+def speaks(y: Vector3) -> None:
+    y[0] = prints(y[1])
+
+
 @kernel
 def calls(u: Vector3, y: Vector3) -> None:
     y[0], y[1] = outer(u[0])
@@ -103,6 +127,29 @@ def test_what_cannot_be_called_is_named(own_cache: None) -> None:
     )
     reason = compile_calls([KernelCall(takes_an_array, np.zeros(3), np.zeros(3))])
     assert "returns array(float64, 1d, C); a kernel takes numbers" in reason
+
+
+def test_what_numba_does_not_compile_is_a_mistake_with_its_line(own_cache: None) -> None:
+    text = mistake_in(catches, [np.zeros(3)], run=False)
+    line = matches.py_func.__code__.co_firstlineno + 4
+    assert text.startswith(f"{__file__}:") and "kernel catches: numba function " in text
+    assert f"does not compile: line {line} of " in text
+    assert text.endswith("test_numba_calls.py: UnsupportedError: Exception matching is limited to <class 'Exception'>")  # fmt: skip
+
+
+def test_code_that_needs_objects_of_python_is_made_anew(
+    own_cache: None, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for _ in range(2):
+        y = np.array([0.0, 0.25, 0.0])
+        call = KernelCall(speaks, y)
+        assert compile_calls([call]) == "" and call.compiled is not None
+        call.run()
+        sys.stdout.flush()
+        assert y[0] == 0.5 and capfd.readouterr().out == "x is 0.25\n"
+        monkeypatch.setattr(numba_calls, "_made", {})
+        monkeypatch.setattr(numba_calls, "_addresses", {})
+        monkeypatch.setattr(module, "_loaded", {})
 
 
 def test_another_process_compiles_nothing_of_numba(

@@ -57,6 +57,7 @@ def graph_of(folder: Path, name: str, statement: str, table: str) -> Path:
         ("Beyond", "y.v[0] = a[4]", "np.zeros(4)", "a[4] is beyond a: the indices of its 4 elements are -4 to 3", 24),
         ("Unequal", "y.v[:] = a", "np.zeros(4)", "a value of shape (4,) does not fit into (3,)", 24),
         ("Reaching", "y.v[:] = a[1:4]", "np.zeros(3)", "a value of shape (2,) does not fit into (3,)", 24),
+        ("Single", "y.v[:] = y.v * a", "np.zeros(1)", "shapes (3,) and (1,) do not fit together; one element is repeated only where its array's declaration says that it is one: take it by its index", 24),
         ("Looping", "y.v[0] = [a[i] for i in range(9)][8]", "np.zeros(4)", "index 4 is out of bounds for axis 0", 24),
         ("Failing", "y.v[0] = a[0]", "np.zeros(3) @ np.zeros((4, 4))", "failed in setup: ValueError: matmul", 19),
     ],
@@ -92,7 +93,7 @@ class V(Signal):
 
 @numba.njit
 def product(a):
-    a[:] = np.eye(3) @ a
+    a[0] = np.dot(a, a)
 
 
 class Solving(Block):

@@ -6,6 +6,7 @@ import math
 from enum import IntEnum
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 import pytest
 
@@ -53,6 +54,21 @@ def cancels(u: Vector3, y: Vector3) -> None:
 @kernel
 def jumps(u: Vector3, y: Vector3) -> None:
     y[0] = math.floor(u[0])
+
+
+@numba.njit
+def power(k: int) -> int:
+    return 2**k
+
+
+@numba.njit
+def both(u: Any, k: int) -> Any:
+    return float(power(k)), np.sum(u)
+
+
+@kernel
+def by_numba(u: Vector3, k: int, y: Vector3) -> None:
+    y[0], y[1] = both(u, k)
 
 
 class Counted(NamedTuple):
@@ -168,3 +184,10 @@ def test_at_a_threshold_only_what_is_numpys_is_judged() -> None:
     found[1][0] = 1
     with pytest.raises(NotJudged):
         difference(decides, before, found)
+
+
+def test_functions_of_numba_are_judged_as_they_are_written() -> None:
+    u = np.array([0.1, 0.2, 0.3])
+    assert not difference(by_numba, *after(by_numba, u, 3, np.zeros(3)))
+    said = difference(by_numba, *after(by_numba, u, -1, np.zeros(3)))
+    assert said.endswith("where NumPy has [0.5 0.6 0. ]")
