@@ -17,10 +17,9 @@ COMPILE := $(BIN)/python -c 'import sys; sys.exit(sys.dont_write_bytecode)' || \
 	$(BIN)/python -m compileall -q -x '/(build|tests)/' . $(VENV)/lib || true
 RECORDING := recordings/jump.rrd
 # The far jumps, in whose thrust the controller misses some of the plan.
-REHEARSED := in_situ_18cm in_situ_25cm forward_38cm forward_60cm backward_30cm \
-	sideways_35cm up_8cm up_12cm
+REHEARSED := in_situ_18cm forward_38cm forward_60cm backward_30cm sideways_35cm up_8cm up_12cm
 # Those at the limit of the motors, which are rehearsed as far as their landing.
-LANDINGS := in_situ_32cm sideways_50cm turn_180deg
+LANDINGS := in_situ_25cm in_situ_32cm sideways_50cm down_35cm turn_120deg turn_180deg
 # One thread for each test process: the workers already take every core.
 SINGLE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 # Each worker takes a part of the tests in their order, so that what many tests share is made once;
