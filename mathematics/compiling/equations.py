@@ -29,13 +29,9 @@ from typing import Any
 from .array_loops import ArrayLoops
 from .expressions import EquationError as EquationError  # noqa: PLC0414  also imported from here
 from .expressions import cloned, indices_of, shown
-from .expressions import cross as cross  # noqa: PLC0414
-from .kernel_registry import is_kernel, written_code
+from .kernel_registry import is_kernel, reports_event, written_code
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kinds
 from .slices import Cut, counters_of
-
-VERSION = 5
-"""Counts changes of what a statement is rewritten into: machine code made before is not used."""
 
 
 def expanded_code(function: Any, code: CodeType) -> CodeType:
@@ -120,13 +116,6 @@ def _definition(function: Any, code: CodeType) -> ast.FunctionDef | None:
 
 EVENT = "event_"
 """Name of the argument by which a block's step requests a call of Python after it."""
-
-
-def reports_event(function: Any) -> bool:
-    """Return whether a kernel is a block's step that returns whether ``on_event`` is to be
-    called."""
-    returns = function.__annotations__.get("return")
-    return hasattr(function, "declared_kinds") and returns in ("bool", bool)
 
 
 def _event_place() -> ast.expr:

@@ -13,7 +13,7 @@ import numpy as np
 
 from .arguments import ArgumentType, RecordType
 from .array_code import SIZE_BITS, FunctionCode
-from .failures import Failure, Site
+from .failures import CompileError, Failure, Site
 from .known_functions import ELEMENTWISE, FUNCTIONS, write_elements, write_product
 from .llvm_code import (
     BOOL,
@@ -26,10 +26,6 @@ from .llvm_code import (
     number,
     tuple_of,
 )
-
-
-class CompileError(Exception):
-    """A kernel cannot be compiled; the text gives kernel, place and reason."""
 
 
 class Translated(NamedTuple):
