@@ -346,8 +346,42 @@ class Drawn:
         else:
             self.block(depth)
 
+    def carried(self) -> None:
+        """Write a loop of which each round makes an array anew of that of the round before."""
+        name, other, i = self.new("c"), self.new("c"), self.new("i")
+        matrix = self.below(0.2)
+        begin = self.pick("A", "np.eye(3)", "M.copy()") if matrix else self.pick("v", "np.zeros(3)", "w + 0.5", "v.copy()")  # fmt: skip
+        self.write(f"{name} = {begin}")
+        self.write(f"{other} = {begin}")
+        if self.below(0.3):
+            self.write(f"{i} = 0")
+            self.write(f"while {i} < 3:")
+            self.write(f"    {i} += 1")
+        else:
+            self.write(f"for {i} in range({self.pick('3', '2', 'k')}):")
+        self.indent += 1
+        if matrix:
+            self.write(f"{name} = 0.5 * ({name} @ {self.pick('A', 'M.T', 'body.R')}) + {other}")
+        elif self.below(0.3):
+            self.write(f"{name}, {other} = {other} + {self.vector(3, 0)}, {name} - {self.vector(3, 0)}")  # fmt: skip
+        else:
+            if guarded := self.below(0.3):
+                self.write(f"if on[{i} - 1]:")
+                self.indent += 1
+            before, self.own = self.own, {name: 3, other: 3}
+            self.write(f"{name} = {self.vector(3, 1)} {self.pick('+', '-')} {name}{self.pick('', '[::-1]')}")  # fmt: skip
+            self.indent -= guarded
+            if self.below(0.5):
+                self.write(f"{other} = {self.pick(f'np.array([{name}[2], {other}[0], {name}[1]])', f'np.maximum({other}, {name})', f'A @ {other}')}")  # fmt: skip
+            self.own = before
+        self.indent -= 1
+        self.write(f"M[:] = {name} - {other}" if matrix else f"p[:] = {name} - 0.5 * {other}")
+
     def block(self, depth: int) -> None:
-        form = self.chance.randrange(8)
+        form = self.chance.randrange(10)
+        if form > 7:
+            self.carried()
+            return
         if form < 3:
             self.write(f"if {self.flag()}:")
             self.inside(depth)

@@ -94,14 +94,16 @@ class RecordedRun:
         Raises:
             KeyError: there is no such signal; the message has the nearest names.
         """
-        known = self.signals()
-        if name not in known:
-            name = only_field(name, known) or self.nearest(name)
-        self._asked.add(name)
+        field = self._field(name)
+        self._asked.add(field.name)
         whole = len(self.ticks) * self.header.bus.size
         if "rows" in self.__dict__ or (len(self._asked) > READ_ALONE and whole <= MOST_KEPT):
-            return self.header.bus.layout().view(self.rows, name)
-        return self._source.signal(known[name])
+            return self.header.bus.layout().view(self.rows, field.name)
+        return self._source.signal(field)
+
+    def _field(self, name: str) -> RecordedField:
+        known = self.signals()
+        return known[name if name in known else only_field(name, known) or self.nearest(name)]
 
     def samples(self, name: str) -> tuple[NDArray[np.int64], NDArray[Any]]:
         """Return the ticks at which a signal is kept, (n,), and its values there, (n, ...): a large field of a
@@ -110,10 +112,7 @@ class RecordedRun:
         Raises:
             KeyError: there is no such signal; the message has the nearest names.
         """
-        known = self.signals()
-        if name not in known:
-            name = only_field(name, known) or self.nearest(name)
-        return self._source.samples(known[name])
+        return self._source.samples(self._field(name))
 
     @cached_property
     def _asked(self) -> set[str]:

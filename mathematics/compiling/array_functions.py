@@ -298,9 +298,6 @@ class ArrayFunctions(ArrayEquations):
         self._own.add(made.id)
         return made
 
-    _own: set[str]
-    """Names of arrays of the kernel's own."""
-
     def _shape_in(self, node: ast.Call) -> tuple[int, ...]:
         """Read the shape that a call asks for. Raises ``EquationError``: it is not constant."""
         first = node.args[0] if node.args else None

@@ -29,13 +29,9 @@ from typing import Any
 from .array_loops import ArrayLoops
 from .expressions import EquationError as EquationError  # noqa: PLC0414  also imported from here
 from .expressions import cloned, indices_of, shown
-from .expressions import cross as cross  # noqa: PLC0414
-from .kernel_registry import is_kernel, written_code
+from .kernel_registry import is_kernel, reports_event, written_code
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kinds
 from .slices import Cut, counters_of
-
-VERSION = 5
-"""Counts changes of what a statement is rewritten into: machine code made before is not used."""
 
 
 def expanded_code(function: Any, code: CodeType) -> CodeType:
@@ -122,13 +118,6 @@ EVENT = "event_"
 """Name of the argument by which a block's step requests a call of Python after it."""
 
 
-def reports_event(function: Any) -> bool:
-    """Return whether a kernel is a block's step that returns whether ``on_event`` is to be
-    called."""
-    returns = function.__annotations__.get("return")
-    return hasattr(function, "declared_kinds") and returns in ("bool", bool)
-
-
 def _event_place() -> ast.expr:
     return ast.Subscript(ast.Name(EVENT, ast.Load()), ast.Constant(0), ast.Store())
 
@@ -147,6 +136,12 @@ class _Rewriter(ArrayLoops):
         self._depth = 0
         """The number of loops around the present statement."""
         self._own_of_loops: set[str] = set()
+        self._before_loop: list[ast.stmt] = []
+        """Statements to put in front of the outermost loop around the present statement."""
+        self._first_reads: dict[str, int] = {}
+        """The first line of that loop in which a name is read."""
+        self._made_in_loop: set[str] = set()
+        """Names to which that loop assigns what is no part of another array."""
         self._checks = False
         self.calls: list[tuple[Any, dict[str, Kind]]] = []
         """The kernels that are called, with what they get; of a check only."""
@@ -182,12 +177,59 @@ class _Rewriter(ArrayLoops):
         made: list[ast.stmt] = []
         for statement in statements:
             outer, self._ahead, self._cuts = self._ahead, [], {}
-            rewritten = self._statement(statement)
+            if self._depth:
+                rewritten = self._statement(statement)
+            else:
+                before, self._before_loop = self._before_loop, []
+                rewritten = self._statement(statement)
+                made += self._before_loop
+                self._before_loop = before
             made += [*self._ahead, *rewritten]
             self._ahead = outer
         return made
 
+    def _look_through_loop(self, loop: ast.For | ast.While) -> None:
+        """Note where an outermost loop reads names, and which of them it assigns."""
+        self._first_reads, self._made_in_loop = {}, set()
+        for each in ast.walk(loop):
+            if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Load):
+                first = self._first_reads.get(each.id, each.lineno)
+                self._first_reads[each.id] = min(first, each.lineno)
+            elif isinstance(each, ast.Assign) and not self._root(each.value):
+                self._made_in_loop |= _names_assigned(each.targets)
+
+    def _keep_what_is_carried(self, node: ast.Assign) -> None:
+        """``T = T @ R`` in a loop reads what the round before has made, in the memory that it writes: let it read a copy."""
+        values = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value]
+        if all(self._root(each) or self._chooses(each) for each in values):
+            return
+        read = {each.id for each in ast.walk(node.value) if isinstance(each, ast.Name)}
+        for name in sorted(_names_assigned(node.targets) & read):
+            kind = self._kinds.get(name)
+            if not isinstance(kind, ArrayKind) or not kind.rank:
+                continue
+            old = ast.copy_location(ast.Name(name, ast.Load()), node)
+            ahead, self._ahead = self._ahead, self._before_loop
+            copy = self._room(old, kind)
+            self._ahead = ahead
+            whole = ast.Tuple([ast.Slice() for _ in kind.shape], ast.Load())
+            target = ast.Subscript(ast.Name(copy.id, ast.Load()), whole, ast.Store())
+            for each in ast.walk(target):
+                ast.copy_location(each, node)
+            statement = ast.copy_location(ast.Assign([target], old), node)
+            for made in self._loops(statement, target, old):
+                self._put_ahead(made, node)
+            for each in ast.walk(node.value):
+                if isinstance(each, ast.Name) and each.id == name:
+                    each.id = copy.id
+
     def _statement(self, node: ast.stmt) -> list[ast.stmt]:
+        if isinstance(node, ast.For | ast.While) and not self._depth:
+            self._look_through_loop(node)
+        if isinstance(node, ast.AnnAssign) and node.value is not None:
+            node = ast.copy_location(ast.Assign([node.target], node.value), node)
+        if isinstance(node, ast.Assign) and self._depth:
+            self._keep_what_is_carried(node)
         if isinstance(node, ast.While):
             self._ahead = None
             node.test = self._expression(self._canonical(node.test))
@@ -224,9 +266,6 @@ class _Rewriter(ArrayLoops):
                 node.value = None
                 return [ast.copy_location(written, node), node]
             return [node]
-        if isinstance(node, ast.AnnAssign) and node.value is not None:
-            plain = ast.copy_location(ast.Assign([node.target], node.value), node)
-            return self._assign(plain, node.target)
         for field, value in ast.iter_fields(node):
             if isinstance(value, ast.expr):
                 setattr(node, field, self._expression(value))
@@ -330,7 +369,10 @@ class _Rewriter(ArrayLoops):
             if self._depth and not self._chooses(value):
                 self._own_of_loops.add(name)
             return
-        if isinstance(value, ast.Name) and value.id in self._own_of_loops:
+        made, root = self._own_of_loops, self._root(value)
+        later = self._depth > 0 and root in self._made_in_loop - made
+        read_before = self._first_reads.get(name, node.lineno) < node.lineno
+        if later or (root in made and (isinstance(value, ast.Name) or read_before)):
             text = f"{name} would keep an array that the loop makes anew; make both before the loop"
             raise self._error(node, text)
         if isinstance(value, ast.Name) and value.id in self._own and self._depth:
@@ -567,6 +609,14 @@ class _Rewriter(ArrayLoops):
     def _name(self, stem: str) -> str:
         self._count += 1
         return f"{stem}_{self._count}_"
+
+
+def _names_assigned(targets: Sequence[ast.expr]) -> set[str]:
+    """Return the names that stand by themselves among some targets."""
+    found = [
+        each for one in targets for each in (one.elts if isinstance(one, ast.Tuple) else [one])
+    ]
+    return {each.id for each in found if isinstance(each, ast.Name)}
 
 
 def _loaded(node: ast.expr) -> ast.expr:

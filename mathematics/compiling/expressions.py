@@ -22,6 +22,9 @@ from .kinds import (
     argument_kinds,
 )
 
+VERSION = 6
+"""Counts changes of what a statement is rewritten into: machine code made before is not used."""
+
 Node = TypeVar("Node", bound=ast.AST)
 
 

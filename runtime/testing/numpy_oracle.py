@@ -15,10 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.compiling.equations import reports_event
 from ...mathematics.compiling.expressions import cross
 from ...mathematics.compiling.fingerprint import numba_functions
-from ...mathematics.compiling.kernel_registry import arguments_of, is_kernel, written_code
+from ...mathematics.compiling.kernel_registry import (
+    arguments_of,
+    is_kernel,
+    reports_event,
+    written_code,
+)
 from ...mathematics.compiling.kinds import ArrayKind, Kind, RecordKind, argument_kinds
 from ...mathematics.compiling.numba_calls import is_numba, names_read
 

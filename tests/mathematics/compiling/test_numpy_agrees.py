@@ -272,6 +272,12 @@ def test_the_mean_of_nothing_is_a_division_by_zero() -> None:
             run()
 
 
+def test_arrays_carried_from_round_to_round_are_numpys() -> None:
+    random = np.random.default_rng(1)
+    u, A = random.normal(size=3), random.normal(size=(3, 3))
+    three(carried, u, A, np.zeros(3), np.zeros((3, 3)))
+
+
 def test_a_slice_that_numpy_would_repeat_ends_the_run() -> None:
     untouched(repeated_by_numpy)(np.arange(6.0), 5, np.ones(3))
     with pytest.raises(IndexError, match=r"a slice of . elements stands where . are"):
@@ -298,6 +304,41 @@ def made_in_a_loop(u: Vector3, y: Vector3) -> None:
         t = u * i
         y[:] = last
         last = t
+
+
+@kernel
+def carried(u: Vector3, A: Matrix3, y: Vector3, M: Matrix3) -> None:
+    """Arrays that each round makes anew of those of the round before."""
+    T, x, a, b, k = np.eye(3), u, u + 0.0, 0.5 * u, 0
+    for i in range(3):
+        T = T @ A
+        if u[i] > -0.5:
+            x = A @ x - x[::-1] + u
+        a, b = b + u, a - x
+    while k < 3:
+        x = np.outer(x, u)[1] + np.array([x[1], x[0], x[2]])
+        k += 1
+    y[:] = x + a - 2.0 * b
+    M[:] = T
+
+
+@kernel
+def seen_later(u: Vector3, y: Vector3) -> None:
+    x = u + 0.0
+    for _ in range(3):
+        last = x
+        x = x + u
+        y += last
+
+
+@kernel
+def part_kept(u: Vector3, A: Matrix3, y: Vector3) -> None:
+    row = u
+    for i in range(3):
+        T = A * i
+        if i > 0:
+            y += row
+        row = T[0]
 
 
 @kernel
@@ -352,6 +393,11 @@ def changing_step(a: Array1D, k: int) -> None:
             made_in_a_loop,
             "last would keep an array that the loop makes anew; make both before the loop",
         ),
+        (
+            seen_later,
+            "last would keep an array that the loop makes anew; make both before the loop",
+        ),
+        (part_kept, "row would keep an array that the loop makes anew; make both before the loop"),
         (unknown_argument, "gained has no argument 'factor'; it has x, gain, offset"),
         (of_unknown_size, "this makes a new array: assign it into one, as in scratch.x[:] = ..."),
         (

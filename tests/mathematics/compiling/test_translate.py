@@ -14,8 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aloft.mathematics.compiling.arguments import pack, type_of
+from aloft.mathematics.compiling.failures import CompileError
 from aloft.mathematics.compiling.machine_code import MachineCode
-from aloft.mathematics.compiling.translate import CompileError, Translator
+from aloft.mathematics.compiling.translate import Translator
 from aloft.mathematics.kernel import kernel
 
 from .kernels_for_tests import total_of_positive
