@@ -26,7 +26,7 @@ from enum import IntEnum
 from types import CodeType
 from typing import Any
 
-from .array_loops import ArrayLoops
+from .carried_arrays import CarriedArrays
 from .expressions import EquationError as EquationError  # noqa: PLC0414  also imported from here
 from .expressions import cloned, indices_of, shown
 from .kernel_registry import is_kernel, reports_event, written_code
@@ -122,7 +122,7 @@ def _event_place() -> ast.expr:
     return ast.Subscript(ast.Name(EVENT, ast.Load()), ast.Constant(0), ast.Store())
 
 
-class _Rewriter(ArrayLoops):
+class _Rewriter(CarriedArrays):
     """Rewrites the statements of one function, from the first to the last."""
 
     def __init__(self, function: Any, file: str) -> None:
@@ -133,15 +133,7 @@ class _Rewriter(ArrayLoops):
         self._cuts: dict[str, Cut] = {}
         self._partial: set[str] = set()
         self._own: set[str] = set()
-        self._depth = 0
-        """The number of loops around the present statement."""
-        self._own_of_loops: set[str] = set()
-        self._before_loop: list[ast.stmt] = []
-        """Statements to put in front of the outermost loop around the present statement."""
-        self._first_reads: dict[str, int] = {}
-        """The first line of that loop in which a name is read."""
-        self._made_in_loop: set[str] = set()
-        """Names to which that loop assigns what is no part of another array."""
+        self._foreign: set[str] = set()
         self._checks = False
         self.calls: list[tuple[Any, dict[str, Kind]]] = []
         """The kernels that are called, with what they get; of a check only."""
@@ -188,41 +180,6 @@ class _Rewriter(ArrayLoops):
             self._ahead = outer
         return made
 
-    def _look_through_loop(self, loop: ast.For | ast.While) -> None:
-        """Note where an outermost loop reads names, and which of them it assigns."""
-        self._first_reads, self._made_in_loop = {}, set()
-        for each in ast.walk(loop):
-            if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Load):
-                first = self._first_reads.get(each.id, each.lineno)
-                self._first_reads[each.id] = min(first, each.lineno)
-            elif isinstance(each, ast.Assign) and not self._root(each.value):
-                self._made_in_loop |= _names_assigned(each.targets)
-
-    def _keep_what_is_carried(self, node: ast.Assign) -> None:
-        """``T = T @ R`` in a loop reads what the round before has made, in the memory that it writes: let it read a copy."""
-        values = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value]
-        if all(self._root(each) or self._chooses(each) for each in values):
-            return
-        read = {each.id for each in ast.walk(node.value) if isinstance(each, ast.Name)}
-        for name in sorted(_names_assigned(node.targets) & read):
-            kind = self._kinds.get(name)
-            if not isinstance(kind, ArrayKind) or not kind.rank:
-                continue
-            old = ast.copy_location(ast.Name(name, ast.Load()), node)
-            ahead, self._ahead = self._ahead, self._before_loop
-            copy = self._room(old, kind)
-            self._ahead = ahead
-            whole = ast.Tuple([ast.Slice() for _ in kind.shape], ast.Load())
-            target = ast.Subscript(ast.Name(copy.id, ast.Load()), whole, ast.Store())
-            for each in ast.walk(target):
-                ast.copy_location(each, node)
-            statement = ast.copy_location(ast.Assign([target], old), node)
-            for made in self._loops(statement, target, old):
-                self._put_ahead(made, node)
-            for each in ast.walk(node.value):
-                if isinstance(each, ast.Name) and each.id == name:
-                    each.id = copy.id
-
     def _statement(self, node: ast.stmt) -> list[ast.stmt]:
         if isinstance(node, ast.For | ast.While) and not self._depth:
             self._look_through_loop(node)
@@ -245,11 +202,15 @@ class _Rewriter(ArrayLoops):
         if isinstance(node, ast.Assign) and len(node.targets) > 1:
             return self._assign_in_turn(node)
         if isinstance(node, ast.Assign):
-            if kept is not None and self._is_foreign(node.targets[0], node.value):
+            self._write_out(node)
+        if isinstance(node, ast.Assign):
+            if kept is not None and self._is_foreign(
+                node.targets[0], node.value, isinstance(node.targets[0], ast.Subscript)
+            ):
                 return [kept]
             return self._assign(node, node.targets[0])
         if isinstance(node, ast.AugAssign):
-            if kept is not None and self._is_foreign(node.target, node.value):
+            if kept is not None and self._is_foreign(node.target, node.value, True):
                 return [kept]
             return self._augment(node)
         if isinstance(node, ast.For):
@@ -285,25 +246,6 @@ class _Rewriter(ArrayLoops):
         if isinstance(node, ast.Try):
             node.orelse, node.finalbody = self.body(node.orelse), self.body(node.finalbody)
         return [node]
-
-    def _is_foreign(self, target: ast.expr, value: ast.expr) -> bool:
-        """Return whether an equation has a function that makes an array, and that kernels do not know:
-        it stays as it is, for NumPy and plain Python."""
-        if not self._covers_elements(target):
-            return False
-        for each in ast.walk(value):
-            if (
-                isinstance(each, ast.Call)
-                and not self._applies_to_elements(each)
-                and not self._is_cross(each)
-            ):
-                function = self._resolved(each.func)
-                known = function is not None and (is_kernel(function) or function in _NUMBER_CALLS)
-                takes_arrays = any(map(self._is_array, each.args))
-                module = getattr(function, "__module__", "") or ""
-                if not known and (takes_arrays or module.startswith("numpy")):
-                    return True
-        return False
 
     def _assign_in_turn(self, node: ast.Assign) -> list[ast.stmt]:
         """Write ``a = b = value``, the targets one after the other."""
@@ -358,35 +300,6 @@ class _Rewriter(ArrayLoops):
         node.targets = [self._target(target)]
         return [node]
 
-    def _note_alias(self, node: ast.Assign, name: str, value: ast.expr) -> None:
-        """Note that a name stands for an array, or a part of one."""
-        self._aliases.pop(name, None)
-        self._partial.discard(name)
-        self._own_of_loops.discard(name)
-        if not self._is_array(value):
-            return
-        if not isinstance(value, ast.Name | ast.Attribute | ast.Subscript):
-            if self._depth and not self._chooses(value):
-                self._own_of_loops.add(name)
-            return
-        made, root = self._own_of_loops, self._root(value)
-        later = self._depth > 0 and root in self._made_in_loop - made
-        read_before = self._first_reads.get(name, node.lineno) < node.lineno
-        if later or (root in made and (isinstance(value, ast.Name) or read_before)):
-            text = f"{name} would keep an array that the loop makes anew; make both before the loop"
-            raise self._error(node, text)
-        if isinstance(value, ast.Name) and value.id in self._own and self._depth:
-            self._own_of_loops.add(name)
-        path = self._path(value)
-        if path and path != name:
-            self._aliases[name] = path
-            if (
-                isinstance(value, ast.Subscript)
-                or self._root(value) in self._partial
-                or (isinstance(value, ast.Attribute) and value.attr == "T")
-            ):
-                self._partial.add(name)
-
     def _augment(self, node: ast.AugAssign) -> list[ast.stmt]:
         mask = self._mask_of(node.target)
         if mask is not None:
@@ -401,6 +314,10 @@ class _Rewriter(ArrayLoops):
         ):
             kind, target = self._kind(node.target), node.target
             assert isinstance(kind, ArrayKind)
+            if isinstance(node.value, ast.List | ast.Tuple):
+                node.value = self._made_array(
+                    ast.copy_location(ast.Call(target, [node.value], []), node)
+                )
             if not self._covers_elements(target):  # x += 1.0 of a whole array
                 own = indices_of(target) if isinstance(target, ast.Subscript) else []
                 base = target.value if isinstance(target, ast.Subscript) else _loaded(target)
@@ -490,10 +407,6 @@ class _Rewriter(ArrayLoops):
         if isinstance(kind, ArrayKind) and kind.rank and not self._chooses(node):
             return self._new_array(node)
         return self._expression(node)
-
-    def _chooses(self, node: ast.expr) -> bool:
-        """Return whether an expression hands on one of two arrays: ``a if flag else b``."""
-        return isinstance(node, ast.IfExp) and not self._is_array(node.test)
 
     def _inside(self, node: ast.expr) -> ast.expr:
         """Rewrite the array that a part is taken of: only its indices are numbers."""
@@ -611,14 +524,6 @@ class _Rewriter(ArrayLoops):
         return f"{stem}_{self._count}_"
 
 
-def _names_assigned(targets: Sequence[ast.expr]) -> set[str]:
-    """Return the names that stand by themselves among some targets."""
-    found = [
-        each for one in targets for each in (one.elts if isinstance(one, ast.Tuple) else [one])
-    ]
-    return {each.id for each in found if isinstance(each, ast.Name)}
-
-
 def _loaded(node: ast.expr) -> ast.expr:
     node.ctx = ast.Load()  # type: ignore[attr-defined]  # targets have a context
     return node
@@ -629,6 +534,3 @@ def _called(name: str, argument: ast.expr, place: ast.AST) -> ast.expr:
     for each in (call, call.func):
         ast.copy_location(each, place)
     return call
-
-
-_NUMBER_CALLS = {float, int, bool, abs, min, max, len, round, range}

@@ -325,7 +325,8 @@ class ExpressionTranslator:
 
     def _call(self, node: ast.Call) -> Value:
         if node.keywords or any(isinstance(each, ast.Starred) for each in node.args):
-            raise NotCompilable("a kernel passes arguments by position")
+            text = "a kernel passes arguments by position; write a loop, or put it into an @numba.njit function"
+            raise NotCompilable(f"{ast.unparse(node)[:80]}: {text}")
         if not self._is_outer(node.func):
             raise NotCompilable(f"{ast.unparse(node.func)} is {_NOT_CALLED}")
         function = self._outer(node.func)
