@@ -222,7 +222,8 @@ def made_line(data: Mapping[str, Any]) -> str:
     seeds = data["seeds"]
     alike = len({row["n"] for row in data.get("rows", [])}) <= 1
     each = "" if alike else " (a row has as many as it has runs, from the first)"
-    made = f"Seeds {seeds[0]} to {seeds[-1]}{each}, code of commit {data['commit'][:8]}."
+    which = f"Seeds {seeds[0]} to {seeds[-1]}" if len(seeds) > 1 else f"Seed {seeds[0]}"
+    made = f"{which}{each}, code of commit {data['commit'][:8]}."
     if "same_at" in data and data["same_at"] != data["commit"]:
         count = len(data["probes"])
         made += f" With the code of commit {data['same_at'][:8]} the {count} of them that were run again are the same to the last bit."
