@@ -60,10 +60,16 @@ SAME = ":(exclude)mathematics/compiling"
 MORE: Mapping[str, tuple[str, ...]] = {"paper_plans": ("planner",), "formulations": ("planner",)}
 """What the outcome of a study depends on beside that."""
 MEDIANS: Mapping[str, Mapping[str, tuple[str, float]]] = {
+    "paper_controller": {
+        "apex [cm]": ("apex_above_standing_m", 100.0),
+        "ahead [cm]": ("jump_distance_x_m", 100.0),
+        "turned [deg]": ("jump_yaw_deg", 1.0),
+        "k_y at lift-off [mN m s]": ("lift_off_pitch_momentum_nms", 1000.0),
+    },
     "paper_limits": {
         "ahead [cm]": ("jump_distance_x_m", 100.0),
         "turned [deg]": ("jump_yaw_deg", 1.0),
-    }
+    },
 }
 """Columns of a study's table beside the counts: a metric, and its factor. The median is over the runs that stand."""
 STANDS_TILT = 5.0
@@ -107,7 +113,7 @@ def rows_of(
             values = [
                 factor * run[metric] for run in standing.get(key, []) if run[metric] is not None
             ]
-            row[name] = round(median(values), 1) if values else None
+            row[name] = round(median(values), 1) + 0.0 if values else None
     return list(found.values())
 
 

@@ -27,7 +27,7 @@ from ...mathematics.compiling.kinds import ArrayKind, Kind, RecordKind, argument
 from ...mathematics.compiling.numba_calls import is_numba, names_read
 
 DISTURBANCE = 2.0**-44
-"""By how much numbers are changed, relative to each, to see how far rounding may go."""
+"""The change of numbers, relative to each, that shows how far rounding may go."""
 TRIALS = 4
 
 
@@ -243,7 +243,9 @@ class _Written:
 def _of_elements(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function of numbers that also takes arrays, whose elements it is applied to."""
 
-    def applied(*arguments: Any) -> Any:
+    def applied(*arguments: Any, **named: Any) -> Any:
+        if named or (function in (min, max) and len(arguments) == 1):
+            return function(*arguments, **named)
         if any(isinstance(each, np.ndarray) and each.ndim for each in arguments):
             rows = np.broadcast_arrays(*arguments)
             values = [
