@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
@@ -46,10 +46,12 @@ def plot(
         if not names:
             raise AloftError("which signals? aloft log info FILE.rrd lists them")
         recorded = [read(file) for file in files]
+        stems = [file.stem for file in files]
+        shown = stems if len(set(stems)) == len(stems) else [str(file) for file in files]
         panels = [
             panel
             for name in names
-            for panel in overlaid([panels_of(each, name, start, end) for each in recorded], files)
+            for panel in overlaid([panels_of(each, name, start, end) for each in recorded], shown)
         ]
         if svg is not None or png is not None:
             _draw(panels, run.stem, svg, png)
@@ -64,39 +66,25 @@ def panels_of(run: RecordedRun, name: str, start: float | None, end: float | Non
     Raises:
         AloftError: there is no such signal or element, or nothing was recorded in that time.
     """
-    from ..runtime.language.selection import Selection, read_selection, select
+    from ..logs.viewing.signal_names import element_names, unit_of
+    from ..runtime.running import plots
 
-    known = run.signals()
-    source, selection = read_selection(name) or (name, Selection())
-    base = f"{source}.{selection.field}" if selection.field else source
-    found = [base] if base in known else [n for n in known if n.rpartition(".")[0] == base]
-    if not found:
-        try:
-            run.nearest(name)
-        except KeyError as error:
-            raise AloftError(str(error.args[0])) from error
-    kept = np.ones(len(run.time), bool)
-    kept &= run.time >= start if start is not None else True
-    kept &= run.time <= end if end is not None else True
-    if not kept.any():
-        from ..runtime.running.plots import nothing_between
+    known, robot = run.signals(), run.header.robot
 
-        raise AloftError(nothing_between(start, end))
-    named = run.header.robot.element_names if run.header.robot else {}
-    panels = []
-    for each in found:
+    def legend(each: str, shape: tuple[int, ...]) -> plots.Legend:
         field = known[each]
-        names = named.get(str(field.dimensions[0]), ()) if field.dimensions else ()
-        try:
-            places = select(Selection("", selection.indices), field.shape, names).reshape(-1)
-        except ValueError as error:
-            raise AloftError(f"{name}: {error}") from error
-        panels.append(_panel(run, each, places.tolist(), kept))
-    return panels
+        named = robot.element_names if robot else {}
+        rows = named.get(str(field.dimensions[0]), ()) if field.dimensions else ()
+        return plots.Legend(unit_of(field), element_names(field, robot), rows, field.values)
+
+    try:
+        return plots.panels_of(run, run.__getitem__, legend, name, start, end)
+    except (KeyError, ValueError) as error:
+        raise AloftError(str(error.args[0])) from error
 
 
-def overlaid(runs: Sequence[Sequence[Panel]], files: Sequence[Path]) -> list[Panel]:
-    """Return one panel a field with the lines of all runs, which are named by their files.
+def overlaid(runs: Sequence[Sequence[Panel]], names: Sequence[str]) -> list[Panel]:
+    """Return one panel a field with the lines of all runs, which have their run's name before their own.
 
     Raises:
         AloftError: the runs have other fields of that name.
@@ -105,32 +93,17 @@ def overlaid(runs: Sequence[Sequence[Panel]], files: Sequence[Path]) -> list[Pan
         return list(runs[0])
     if len({len(panels) for panels in runs}) > 1:
         raise AloftError("the recordings have different fields of that name; name one field")
-    stems = [file.stem for file in files]
-    shown = stems if len(set(stems)) == len(stems) else [str(file) for file in files]
     return [
         replace(
             same[0],
             lines=[
                 replace(line, name=f"{name} {line.name}".rstrip())
-                for name, panel in zip(shown, same, strict=True)
+                for name, panel in zip(names, same, strict=True)
                 for line in panel.lines
             ],
         )
         for same in zip(*runs, strict=True)
     ]
-
-
-def _panel(run: RecordedRun, name: str, places: Sequence[int], kept: Any) -> Panel:
-    from ..logs.viewing.signal_names import element_names, unit_of
-    from ..plotting import Curve, Panel
-
-    field = run.signals()[name]
-    values = run[name][kept].reshape(int(kept.sum()), -1).astype(np.float64)
-    labels = element_names(field, run.header.robot) or [str(k) for k in range(values.shape[1])]
-    named = field.shape not in ((), (1,))  # the only element needs no name
-    lines = [Curve(labels[k] if named else "", run.time[kept], values[:, k]) for k in places]
-    unit = unit_of(field)
-    return Panel(f"{name} [{unit}]" if unit else name, lines, y_names=field.values)
 
 
 def _draw(panels: Sequence[Panel], title: str, svg: Path | None, png: Path | None) -> None:

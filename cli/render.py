@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from ..runtime.language.errors import AloftError
+from .plot import overlaid, panels_of
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_json, progress_bar, say
 from .shared.viewing import read
-
-if TYPE_CHECKING:
-    from ..logs.file.reader import RecordedRun
-    from ..plotting import Panel
 
 
 def render(
@@ -87,7 +82,11 @@ def render(
         camera = Camera(width, height, azimuth, elevation, distance, follow, not no_forces, overlay)
         runs = [read(file) for file in recordings]
         takes = [Take(run, name, camera) for run, name in zip(runs, names, strict=True)]
-        panels = _panels(runs, names, plots or [], start, end)
+        panels = [
+            panel
+            for signal in plots or []
+            for panel in overlaid([panels_of(run, signal, start, end) for run in runs], names)
+        ]
         first, last = (start, end) if at is None else (at, at)
         times = instants(takes, first, last, speed / rate)
         out = console()
@@ -104,25 +103,3 @@ def render(
             out,
             f"{count} picture{'s' if count != 1 else ''} in {path}, {path.stat().st_size / 1e6:.1f} MB",
         )
-
-
-def _panels(
-    runs: Sequence[RecordedRun],
-    names: Sequence[str],
-    signals: Sequence[str],
-    start: float | None,
-    end: float | None,
-) -> list[Panel]:
-    """Make the panels of all signals, each with the curves of all runs."""
-    from .plot import panels_of
-
-    joined = []
-    for signal in signals:
-        for same in zip(*(panels_of(run, signal, start, end) for run in runs), strict=True):
-            curves = [
-                replace(line, name=" ".join(filter(None, (line.name, name * (len(runs) > 1)))))
-                for panel, name in zip(same, names, strict=True)
-                for line in panel.lines
-            ]
-            joined.append(replace(same[0], lines=curves))
-    return joined

@@ -162,22 +162,26 @@ class Judge:
         body = source[source.index(f"def {name}(") :].split("\n\n")[0]
         self.tally.wrong.append(f"{text}\n{body}")
 
+    def _refused(self, module: Any, name: str, text: str) -> None:
+        self.tally.counts["refused"] += 1
+        if not re.search(r"drawn_\d+_\d+\.py:\d+: kernel", text):
+            self._wrong(module, name, f"refused without a line: {text}")
+        self.tally.refusals[re.sub(r".*?: kernel \S+: ", "", text)[:60]] += 1
+
     def _by_numpy(self, module: Any, name: str) -> Iterator[Judged]:
         """Run a kernel as it is written, and in plain Python with its loops; yield the runs that are right."""
-        from ..mathematics.compiling.rehearsal import mistake_in
+        from ..mathematics.compiling.expressions import EquationError
+        from ..mathematics.kernel import expand
 
         counts, refusals = self.tally.counts, self.tally.refusals
         function = getattr(module, name)
         try:
-            refusal = mistake_in(function, arguments_for(module, 1000 * self._seed), run=False)
+            expand(function)
+        except EquationError as error:
+            self._refused(module, name, str(error))
+            return
         except Exception as error:  # noqa: BLE001  # whatever it is, it is a mistake of ours
             self._wrong(module, name, f"{type(error).__name__}: {error}")
-            return
-        if refusal:
-            counts["refused"] += 1
-            if not re.search(r"drawn_\d+_\d+\.py:\d+: kernel", refusal):
-                self._wrong(module, name, f"refused without a line: {refusal}")
-            refusals[re.sub(r".*?: kernel \S+: ", "", refusal)[:60]] += 1
             return
         for run in range(self._runs):
             arguments = arguments_for(module, 1000 * self._seed + run)
@@ -248,7 +252,17 @@ class Judge:
                 return
 
     def _by_exported_library(self, module: Any, judged: Sequence[Judged]) -> None:
-        """Compare what an exported library, linked by the compiler of C, makes of some kernels."""
+        """Compare what an exported library, linked by the compiler of C, makes of some kernels, unless the sizes of
+        their arguments make a graph refuse them."""
+        from ..mathematics.compiling.rehearsal import mistake_in
+
+        refused = {each.name: mistake_in(each.kernel, each.before, run=False) for each in judged}
+        judged = [each for each in judged if not refused[each.name]]
+        for name, text in refused.items():
+            if text:
+                self._refused(module, name, text)
+        if not judged:
+            return
         with tempfile.TemporaryDirectory() as folder:
             found = run_exported(module, judged, Path(folder))
         self.tally.counts["in exported libraries"] += len(judged)

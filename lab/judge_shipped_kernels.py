@@ -24,10 +24,14 @@ import numpy as np
 
 from ..mathematics.compiling.call_sequence import CallSequence
 from ..mathematics.compiling.compile_calls import compile_calls
-from ..mathematics.compiling.equations import reports_event
 from ..mathematics.compiling.expressions import cross
 from ..mathematics.compiling.kernel_call import KernelCall
-from ..mathematics.compiling.kernel_registry import arguments_of, is_kernel, written_code
+from ..mathematics.compiling.kernel_registry import (
+    arguments_of,
+    is_kernel,
+    reports_event,
+    written_code,
+)
 from ..mathematics.compiling.kinds import ArrayKind, RecordKind, argument_kinds
 from ..robots.description import find_robot
 from ..runtime.graph import load

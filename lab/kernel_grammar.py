@@ -197,13 +197,15 @@ class Drawn:
             return f"({self.number(1)} {self.pick('*', '+', '-')} {a})"
         if length == 3 and form < 13:
             return (
-                f"(A @ {b})", f"({a} @ {self.pick('A', 'M.T', 'body.R')})", f"cross({a}, {b})", f"(B @ {self.vector(4, 0)})",
+                f"(A @ {b})", f"({a} @ {self.pick('A', 'M.T', 'body.R')})", f"cross({a}, {b})",
+                self.pick(f"(B @ {self.vector(4, 0)})", "np.sum(A, axis=1)", "(A * 2.0 - M).max(axis=0)", "np.mean(M, axis=-1)"),
             )[form - 9]  # fmt: skip
         return self.pick(
             f"(-{a})", f"abs({a})", f"np.minimum({a}, {b})", f"np.maximum({a}, 0.5)", f"np.clip({a}, -1.0, {self.pick('1.0', 's * s')})",
             f"np.where({a} > {b}, {a}, 0.0)", f"({a} / 4.0)", f"np.sqrt(np.abs({a}))", f"np.sin({a})", f"({a} / (1.0 + abs({b})))",
             f"half({a})", f"({a} ** 2)", f"({a} % 0.75)", f"np.floor({a})", f"np.arctan2({a}, {b})", f"({a} * np.sum({b}))",
             f"({a} if {self.flag()} else {b})", f"np.tanh({a})", f"({a} - np.dot({b}, {b}))", f"np.sign({a})",
+            f"np.clip({a}, -math.pi, np.pi / 2)", f"np.mod({a}, 0.75)", f"np.round({a})", f"np.deg2rad({a})",
         )  # fmt: skip
 
     def matrix(self, depth: int = 2) -> str:
@@ -328,7 +330,10 @@ class Drawn:
         elif form == 13:
             self.write("p[on] = " + self.pick("v[on]", "v[on] * 2.0 - w[on]", "w[on]"))
         elif form == 14:
-            self.write(f"p[0], p[2] = {self.number(1)}, {self.number(1)}")
+            self.write(self.pick(
+                f"p[0], p[2] = {self.number(1)}, {self.number(1)}", f"M[1] = [{self.number(1)}, p[2], {self.number(1)}]",
+                f"p[2], p[0], r[5] = {self.vector(3, 1)}", f"p[:] += [{self.number(1)}, p[0], {self.number(0)}]",
+            ))  # fmt: skip
         elif form == 15:
             self.write(f"r[0], r[1] = both({self.number(1)}, {self.number(1)})")
         elif form == 16:
@@ -346,8 +351,42 @@ class Drawn:
         else:
             self.block(depth)
 
+    def carried(self) -> None:
+        """Write a loop of which each round makes an array anew of that of the round before."""
+        name, other, i = self.new("c"), self.new("c"), self.new("i")
+        matrix = self.below(0.2)
+        begin = self.pick("A", "np.eye(3)", "M.copy()") if matrix else self.pick("v", "np.zeros(3)", "w + 0.5", "v.copy()")  # fmt: skip
+        self.write(f"{name} = {begin}")
+        self.write(f"{other} = {begin}")
+        if self.below(0.3):
+            self.write(f"{i} = 0")
+            self.write(f"while {i} < 3:")
+            self.write(f"    {i} += 1")
+        else:
+            self.write(f"for {i} in range({self.pick('3', '2', 'k')}):")
+        self.indent += 1
+        if matrix:
+            self.write(f"{name} = 0.5 * ({name} @ {self.pick('A', 'M.T', 'body.R')}) + {other}")
+        elif self.below(0.3):
+            self.write(f"{name}, {other} = {other} + {self.vector(3, 0)}, {name} - {self.vector(3, 0)}")  # fmt: skip
+        else:
+            if guarded := self.below(0.3):
+                self.write(f"if on[{i} - 1]:")
+                self.indent += 1
+            before, self.own = self.own, {name: 3, other: 3}
+            self.write(f"{name} = {self.vector(3, 1)} {self.pick('+', '-')} {name}{self.pick('', '[::-1]')}")  # fmt: skip
+            self.indent -= guarded
+            if self.below(0.5):
+                self.write(f"{other} = {self.pick(f'np.array([{name}[2], {other}[0], {name}[1]])', f'np.maximum({other}, {name})', f'A @ {other}')}")  # fmt: skip
+            self.own = before
+        self.indent -= 1
+        self.write(f"M[:] = {name} - {other}" if matrix else f"p[:] = {name} - 0.5 * {other}")
+
     def block(self, depth: int) -> None:
-        form = self.chance.randrange(8)
+        form = self.chance.randrange(10)
+        if form > 7:
+            self.carried()
+            return
         if form < 3:
             self.write(f"if {self.flag()}:")
             self.inside(depth)

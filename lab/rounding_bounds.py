@@ -183,7 +183,9 @@ class Bounded:
         bound = terms.size * EPS * terms.sum() + self.bound.sum()
         return Bounded(np.sum(self.value), 0.0 if _is_exact(self) else bound)
 
-    def max(self) -> Bounded:
+    def max(self, axis: int | None = None) -> Bounded:
+        if axis is not None:
+            return _of_rows(Bounded.max, self, axis)
         return Bounded(np.max(self.value), np.max(self.bound))
 
     def min(self) -> Bounded:
@@ -192,6 +194,8 @@ class Bounded:
 
 def bounded(value: Any) -> Bounded:
     """Return a number or an array as one that carries its bound, which is zero if it had none."""
+    if isinstance(value, list):
+        return _array(value)
     return value if isinstance(value, Bounded) else Bounded(value)
 
 
@@ -355,11 +359,19 @@ def _filled(make: Any) -> Callable[..., Bounded]:
     return made
 
 
-def _summed(x: Any) -> Any:
+def _of_rows(function: Callable[[Any], Any], x: Bounded, axis: int) -> Bounded:
+    return _array([function(row) for row in (x.T if axis == 0 else x)])
+
+
+def _summed(x: Any, axis: int | None = None) -> Any:
+    if axis is not None:
+        return _of_rows(_summed, x, axis)
     return x.sum() if isinstance(x, Bounded) else np.sum(x)  # of whole numbers or flags
 
 
-def _mean(x: Any) -> Bounded:
+def _mean(x: Any, axis: int | None = None) -> Bounded:
+    if axis is not None:
+        return _of_rows(_mean, x, axis)
     return bounded(x).sum() / float(bounded(x).value.size)
 
 
@@ -369,9 +381,10 @@ def _clip(x: Any, low: Any, high: Any) -> Bounded:
 
 NUMPY = types.SimpleNamespace(
     minimum=_chosen(np.minimum), maximum=_chosen(np.maximum), clip=_clip, where=_where, abs=abs, sqrt=_sqrt,
-    sin=elementary(np.sin, lambda x: x.bound), tanh=elementary(np.tanh), floor=_step(np.floor), sign=_step(np.sign),
+    sin=elementary(np.sin, lambda x: x.bound), tanh=elementary(np.tanh), floor=_step(np.floor), round=_step(np.rint), sign=_step(np.sign),
     arctan2=elementary(np.arctan2, _arctan2_steepness), sum=_summed, mean=_mean, prod=_product_of,
     max=lambda x: x.max(), min=lambda x: x.min(), argmax=_extreme(np.argmax, 1.0), argmin=_extreme(np.argmin, -1.0),
+    mod=lambda a, b: bounded(a) % b, deg2rad=lambda x: bounded(x) * (math.pi / 180.0), pi=math.pi,
     any=np.any, all=np.all, dot=lambda a, b: bounded(a) @ b, cross=_cross,
     outer=lambda a, b: bounded(a)[:, None] * bounded(b)[None, :],
     zeros=_filled(np.zeros), ones=_filled(np.ones), full=_filled(np.full), eye=_filled(np.eye), array=_array,

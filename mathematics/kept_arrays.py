@@ -12,7 +12,7 @@ import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache
-from importlib import import_module, metadata
+from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 from typing import Any, cast
@@ -81,6 +81,8 @@ LIBRARIES = ("numpy", "pin")
 def code_digest(*folders: str) -> bytes:
     """Hash all source files in these folders of the package, such as ``planner/models``, and the
     versions of the libraries that compute."""
+    from importlib import metadata  # a twentieth of a start
+
     root, digest = Path(__file__).parents[1], hashlib.blake2b(digest_size=16)
     for folder in folders:
         for path in sorted((root / folder).rglob("*.py")):

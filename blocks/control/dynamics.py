@@ -24,7 +24,7 @@ from ...mathematics.body_dynamics import (
     set_body_poses,
     velocity_at,
 )
-from ...mathematics.compiling.equations import cross
+from ...mathematics.compiling.expressions import cross
 from ...mathematics.constants import GRAVITY
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import normalise, rotate_back, to_matrix

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ...mathematics.arrays import Array, Matrix3, Vector3
 from ...mathematics.compiling.call_sequence import Call
-from ...mathematics.compiling.equations import cross
+from ...mathematics.compiling.expressions import cross
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ...runtime.language.signals import Field, Signal

@@ -4,13 +4,16 @@ which are stale.
 ::
 
     python lab/pages/study_data.py keep [--commit C] RESULTS ...   a data file and tables from folders of `aloft study`
+    python lab/pages/study_data.py probe [STUDY ...]               run a few of a data file's runs again; exit 1 if any differ
     python lab/pages/study_data.py stale                           what has changed since, by data file; exit 1 if any
     python lab/pages/study_data.py mark                            write that below the tables
 
 A data file is ``STUDY.json`` in ``docs/data``. Its table stands in the pages of ``PAGES`` between ``<!-- data: STUDY -->`` and
 ``<!-- end of data: STUDY -->``, and a test holds the two together. A table is stale if the files in ``measures`` of its data
-file have changed since its commit. ``older`` are tables that were made before there were data files: their commit is
-that of their last change.
+file have changed since its commit.
+
+Most changes of a file change no run. So a data file has ``probes``: runs with their hashes, every value of every axis in one of them
+at least. Where all give the same hash with the present code, ``same_at`` is its commit, and a table is stale from there.
 """
 
 from __future__ import annotations
@@ -18,7 +21,8 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from statistics import median
 from types import MappingProxyType
@@ -27,15 +31,20 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 DATA = "docs/data"
 PAGES: Mapping[str, tuple[str, ...]] = {
+    "estimator": ("docs/comparisons.md",),
+    "formulations": ("docs/comparisons.md",),
     "paper_controller": ("docs/comparisons.md",),
     "paper_limits": ("docs/comparisons.md",),
     "paper_factors": ("docs/comparisons.md",),
     "paper_plans": ("docs/comparisons.md",),
-    "paper_polar": ("docs/landing.md",),
     "paper_pushes": ("docs/landing.md",),
+    "push_polar": ("docs/landing.md",),
+    "push_polar_12cm": ("docs/landing.md",),
     "push_strongest": ("docs/landing.md",),
     "somersaults": ("docs/planning.md",),
 }
+REFRESHED = ("estimator",)
+"""Their tables are made by ``refresh.py``."""
 CONTROLLER = (
     "blocks",
     "mathematics",
@@ -46,13 +55,21 @@ CONTROLLER = (
     "robots/bruce",
 )
 """What the outcome of a jump depends on."""
-MORE: Mapping[str, tuple[str, ...]] = {"paper_plans": ("planner",)}
+SAME = ":(exclude)mathematics/compiling"
+"""How kernels are compiled: tests hold their results to those of Python, to the last bit."""
+MORE: Mapping[str, tuple[str, ...]] = {"paper_plans": ("planner",), "formulations": ("planner",)}
 """What the outcome of a study depends on beside that."""
 MEDIANS: Mapping[str, Mapping[str, tuple[str, float]]] = {
+    "paper_controller": {
+        "apex [cm]": ("apex_above_standing_m", 100.0),
+        "ahead [cm]": ("jump_distance_x_m", 100.0),
+        "turned [deg]": ("jump_yaw_deg", 1.0),
+        "k_y at lift-off [mN m s]": ("lift_off_pitch_momentum_nms", 1000.0),
+    },
     "paper_limits": {
         "ahead [cm]": ("jump_distance_x_m", 100.0),
         "turned [deg]": ("jump_yaw_deg", 1.0),
-    }
+    },
 }
 """Columns of a study's table beside the counts: a metric, and its factor. The median is over the runs that stand."""
 STANDS_TILT = 5.0
@@ -96,15 +113,73 @@ def rows_of(
             values = [
                 factor * run[metric] for run in standing.get(key, []) if run[metric] is not None
             ]
-            row[name] = round(median(values), 1) if values else None
+            row[name] = round(median(values), 1) + 0.0 if values else None
     return list(found.values())
+
+
+def probes_of(folder: Path, labels: Sequence[str]) -> list[dict[str, Any]]:
+    """Return a few runs of a study's results with their hashes, such that they have every value of every label."""
+    from pyarrow import parquet
+
+    runs = parquet.read_table(folder / "runs.parquet").to_pylist()
+    missing = {(label, run[label]) for run in runs for label in labels}
+    found = list[dict[str, Any]]()
+    while missing or not found:
+        best = max(runs, key=lambda run: sum((label, run[label]) in missing for label in labels))
+        where = {label: best[label] for label in labels}
+        missing -= set(where.items())
+        found.append({"where": where, "seed": best["seed"], "run_hash": best["run_hash"]})
+    return found
+
+
+def run_again(study: Path, probe: Mapping[str, Any]) -> list[str]:
+    """Return the hashes of a probe's runs with the present code: of more than one where the labels leave out an axis."""
+    from pyarrow import parquet
+
+    chosen = [text for pair in probe["where"].items() for text in ("--where", "=".join(pair))]
+    seeds = f"{probe['seed']}:{probe['seed'] + 1}"
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run(
+            ["aloft", "study", study, "--seeds", seeds, *chosen, "--workers", "1", "--out", folder],
+            capture_output=True,
+            check=False,
+        )
+        table = Path(folder) / "runs.parquet"
+        if not table.is_file():
+            return []
+        return [str(run["run_hash"]) for run in parquet.read_table(table).to_pylist()]
+
+
+def probe(
+    root: Path,
+    names: Sequence[str],
+    commit: str,
+    hashes: Callable[[Path, Mapping[str, Any]], Sequence[str]] = run_again,
+) -> list[str]:
+    """Run the probes of data files again, all where none is named, and write ``same_at`` in those where none differs.
+
+    Returns: a line for every probe that differs.
+    """
+    differ = list[str]()
+    for name, data in data_files(root):
+        if (names and name not in names) or "probes" not in data:
+            continue
+        changed = [
+            f"{name}: {each['where']}, seed {each['seed']}, runs otherwise"
+            for each in data["probes"]
+            if each["run_hash"] not in hashes(root / data["study"], each)
+        ]
+        if not changed:
+            write(root, name, {**data, "same_at": commit})
+        differ += changed
+    return differ
 
 
 def labels_of(folder: Path) -> list[str]:
     """Return the names of a study's axes that have more than one value."""
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     rows = summary["rows"]
-    known = ("task", "jump", "arm", "trial", "feet", "steps")
+    known = ("task", "jump", "arm", "trial", "feet", "steps", "impulse_n_s")
     return [name for name in known if name in rows[0] and len({str(row[name]) for row in rows}) > 1]
 
 
@@ -131,11 +206,24 @@ def table_of(data: Mapping[str, Any]) -> str:
         shown = " | ".join(cells)
         counts = f"{row['stands']} of {row['n']} | {row['successes']} of {row['n']}"
         lines.append(f"| {shown} | {counts} | {told} |")
+    return "\n".join([*lines, "", made_line(data)]) + "\n"
+
+
+def made_line(data: Mapping[str, Any]) -> str:
+    """Return how the runs of a data file were made."""
     seeds = data["seeds"]
-    alike = len({row["n"] for row in data["rows"]}) == 1
+    alike = len({row["n"] for row in data.get("rows", [])}) <= 1
     each = "" if alike else " (a row has as many as it has runs, from the first)"
     made = f"Seeds {seeds[0]} to {seeds[-1]}{each}, code of commit {data['commit'][:8]}."
-    return "\n".join([*lines, "", made]) + "\n"
+    if "same_at" in data and data["same_at"] != data["commit"]:
+        count = len(data["probes"])
+        made += f" With the code of commit {data['same_at'][:8]} the {count} of them that were run again are the same to the last bit."
+    return made
+
+
+def inside_of(data: Mapping[str, Any]) -> str:
+    """Return what stands between the marks of a data file that is not stale."""
+    return table_of(data) if "rows" in data else made_line(data) + "\n" if "seeds" in data else ""
 
 
 def replaced(text: str, mark: str, inside: str) -> str:
@@ -169,7 +257,7 @@ def git(root: Path, *arguments: str) -> str:
 
 def changed_since(root: Path, commit: str, measures: Sequence[str]) -> list[str]:
     """Return the files below ``measures`` that differ between a commit and the files as they are, tests excepted."""
-    names = git(root, "diff", "--name-only", commit, "--", *measures).splitlines()
+    names = git(root, "diff", "--name-only", commit, "--", *measures, SAME).splitlines()
     found = [
         name for name in names if name.endswith((".py", ".yaml", ".xml")) and "/tests/" not in name
     ]
@@ -185,26 +273,32 @@ def data_files(root: Path) -> Iterator[tuple[str, dict[str, Any]]]:
 def stale(root: Path) -> dict[str, list[str]]:
     """Return the files that have changed since, by data file; those with none are left out."""
     found = {
-        name: changed_since(root, data["commit"], data["measures"])
-        for name, data in data_files(root)
+        name: changed_since(root, since(data), data["measures"]) for name, data in data_files(root)
     }
     return {name: changed for name, changed in found.items() if changed}
+
+
+def since(data: Mapping[str, Any]) -> str:
+    """Return the commit whose code makes the runs of a data file, as far as is known."""
+    return str(data.get("same_at", data["commit"]))
 
 
 def stale_line(commit: str, changed: Sequence[str]) -> str:
     """Return the line below a table that is stale."""
     shown = ", ".join(f"`{name}`" for name in changed[:3])
     more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
-    return f"*Stale: since commit {commit[:8]}, with which this was measured, {shown}{more} changed.*\n"
+    return (
+        f"*Stale: since commit {commit[:8]}, whose code made these runs, {shown}{more} changed.*\n"
+    )
 
 
 def write_tables(root: Path) -> None:
     """Write the tables of all data files into their pages, with a line below those that are stale."""
     behind = stale(root)
     for name, data in data_files(root):
-        inside = table_of(data) if "rows" in data else ""
+        inside = inside_of(data)
         if name in behind:
-            inside += "\n" + stale_line(data["commit"], behind[name])
+            inside += "\n" + stale_line(since(data), behind[name])
         for page in data["pages"]:
             path = root / page
             text = replaced(path.read_text(encoding="utf-8"), name, inside)
@@ -213,11 +307,17 @@ def write_tables(root: Path) -> None:
 
 def keep(root: Path, folders: Sequence[Path], commit: str) -> Path:
     """Write the data file of a study's results. Of several folders the first has all cells, and later ones replace those
-    that they made with more seeds."""
+    that they made with more seeds.
+
+    Raises:
+        ValueError: the folders are of different studies.
+    """
     summaries = [
         json.loads((folder / "summary.json").read_text(encoding="utf-8")) for folder in folders
     ]
     name = summaries[0]["study"]
+    if others := sorted({summary["study"] for summary in summaries} - {name}):
+        raise ValueError(f"folders of one study at a time: these are of {name} and of {others[0]}")
     labels, medians = labels_of(folders[0]), MEDIANS.get(name, {})
     rows: dict[tuple[Any, ...], dict[str, Any]] = {}
     for folder in folders:
@@ -234,10 +334,22 @@ def keep(root: Path, folders: Sequence[Path], commit: str) -> Path:
         "labels": labels,
         "medians": list(medians),
         "rows": list(rows.values()),
+        "probes": probes_of(folders[0], labels),
     }
     path = root / DATA / f"{name}.json"
+    before = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    if all(before.get(key) == data[key] for key in ("commit", "probes")) and "same_at" in before:
+        data["same_at"] = before["same_at"]
+    if name in REFRESHED:
+        del data["rows"], data["medians"]
+    return write(root, name, data)
+
+
+def write(root: Path, name: str, data: Mapping[str, Any]) -> Path:
+    """Write a data file."""
+    path = root / DATA / f"{name}.json"
     path.parent.mkdir(exist_ok=True)
-    path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    path.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     return path
 
 
@@ -245,10 +357,13 @@ def main(arguments: Sequence[str]) -> int:
     """Run the command line."""
     verb, *rest = arguments or ("",)
     if verb == "keep":
-        commit = git(ROOT, "rev-parse", "HEAD")
-        if rest[:1] == ["--commit"]:
-            commit, rest = rest[1], rest[2:]
-        print(keep(ROOT, [Path(folder) for folder in rest], commit))
+        commit, folders = (rest[1], rest[2:]) if rest[:1] == ["--commit"] else ("HEAD", rest)
+        print(keep(ROOT, [Path(each) for each in folders], git(ROOT, "rev-parse", commit)))
+    elif verb == "probe":
+        differ = probe(ROOT, rest, git(ROOT, "rev-parse", "HEAD"))
+        print("\n".join(differ))
+        write_tables(ROOT)
+        return 1 if differ else 0
     elif verb == "stale":
         behind = stale(ROOT)
         for name, changed in behind.items():

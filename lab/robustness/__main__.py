@@ -27,7 +27,7 @@ def commands(folder: str) -> list[tuple[str, list[str], int]]:
     study = ["-m", "aloft", "study", str(GRAPHS / "studies" / "wrong_imu.yaml")]
     return [
         ("late ticks", ["-m", "aloft.lab.robustness.lateness"], 180),
-        ("damaged caches", ["-m", "aloft.lab.robustness.caches", "2"], 720),
+        ("damaged caches", ["-m", "aloft.lab.robustness.caches", "1"], 720),
         ("warm windings of the twin", twin, 120),
         ("wrong IMUs", [*study, "--seeds", "99000:99004", "--out", folder], 720),
     ]

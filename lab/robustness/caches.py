@@ -1,9 +1,8 @@
 """Damages what is kept in the cache folder, in every way and kind, and counts the runs that are as before.
 
 ``python -m aloft.lab.robustness.caches 5 kernels`` prints the rows of a kind, each tried five times; without kinds all of
-``KINDS``. Each run is a process of its own with a cache
-folder that a whole run has filled; it counts if it ends with success and the same run hash, or, of the
-planner's code, with the same values of its functions.
+``KINDS``. Each run plans a jump and does it, in a process of its own, with a copy of a cache folder that a
+whole run has filled. It counts if it ends with success and the hash of a run without any cache.
 """
 
 from __future__ import annotations
@@ -15,21 +14,20 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from ...files.cache import cache_root
-
 SEED = 54
-JUMP = Path(__file__).parents[2] / "graphs" / "jump.yaml"
 HEAD = ("what is damaged", "how", "runs as before")
+KINDS = ("kernels", "expansions", "processors", "arrays", "checked", "planner", "plans", "folder")
 
 Damage = Callable[[list[Path], random.Random], None]
 
 
 def flip(found: list[Path], draw: random.Random) -> None:
-    """Flip one bit in every tenth file."""
-    for path in found[:: max(1, len(found) // 10)]:
+    """Flip one bit in every file."""
+    for path in found:
         data = bytearray(path.read_bytes())
         if data:
             data[draw.randrange(len(data))] ^= 1 << draw.randrange(8)
@@ -51,6 +49,8 @@ def empty(found: list[Path], draw: random.Random) -> None:
 
 def exchange(found: list[Path], draw: random.Random) -> None:
     """Exchange files with each other."""
+    if len(found) == 1:
+        found = [*found, next(p for p in found[0].parents[1].rglob("*.npz") if p not in found)]
     data = [path.read_bytes() for path in found]
     for path, other in zip(found, [*data[1:], data[0]], strict=True):
         _lay(path, other)
@@ -79,25 +79,36 @@ def _lay(path: Path, data: bytes) -> None:
     path.chmod(0o600)
 
 
-def outcome(cache: Path, **extra: str) -> str:
-    """Return the hash of a run of ``JUMP`` with this cache folder; the exit code where it failed."""
-    env = {**os.environ, "XDG_CACHE_HOME": str(cache)}
-    if "home" in extra:
-        env["HOME"] = extra["home"]
-    done = subprocess.run(
-        [sys.executable, "-m", "aloft", "run", str(JUMP), "--no-record", "--json"],
-        check=False, env=env, capture_output=True, text=True, timeout=600,
-    )  # fmt: skip
+READ_ONLY = 'mount --bind "$0" "$0" && mount -o remount,ro,bind "$0" && exec "$@"'
+
+
+def jump(
+    cache: Path, rise: int = 133, *, read_only: bool = False, until: float | None = None
+) -> str:
+    """Return the hash of a planned jump with this cache folder; the exit code where it failed.
+
+    Args:
+        cache: the folder, which is the home, too.
+        rise: how high it jumps [mm].
+        read_only: whether nothing can be written there.
+        until: the time [s] after which the run is killed.
+    """
+    words = [sys.executable, "-m", "aloft", "jump", "--rise", f"{rise} mm", "--no-record", "--json"]
+    if read_only and os.geteuid() == 0:  # the modes of files do not hold root back
+        words = ["unshare", "--mount", "sh", "-c", READ_ONLY, str(cache), *words]
+    elif read_only:
+        for each in [cache, *cache.rglob("*")]:
+            each.chmod(each.stat().st_mode & ~0o222)
+    env = {**os.environ, "XDG_CACHE_HOME": str(cache), "HOME": str(cache)}
+    try:
+        done = subprocess.run(
+            words, check=False, env=env, capture_output=True, text=True, timeout=until or 600.0
+        )
+    except subprocess.TimeoutExpired:
+        return "killed"
     return (
         f"exit code {done.returncode}" if done.returncode else json.loads(done.stdout)["run_hash"]
     )
-
-
-def _files(home: Path, kind: str) -> list[Path]:
-    return [p for p in sorted((home / "aloft" / kind).rglob("*")) if p.is_file()]
-
-
-KINDS = ("kernels", "arrays", "checked", "planner", "folder")
 
 
 def rows(turns: int, kinds: Sequence[str]) -> Iterator[Sequence[str]]:
@@ -105,78 +116,57 @@ def rows(turns: int, kinds: Sequence[str]) -> Iterator[Sequence[str]]:
     draw = random.Random(SEED)
     with tempfile.TemporaryDirectory() as folder:
         whole = Path(folder) / "whole"
-        expected = outcome(whole) if set(kinds) != {"planner"} else ""
-        for kind in (kind for kind in ("kernels", "arrays", "checked") if kind in kinds):
-            for damage in DAMAGES:
-                same = 0
-                for turn in range(turns):
-                    home = Path(folder) / f"{kind}-{damage.__name__}-{turn}"
-                    shutil.copytree(whole, home)
-                    damage(_files(home, kind), draw)
-                    same += outcome(home) == expected
-                    shutil.rmtree(home)
-                yield kind, (damage.__doc__ or "").rstrip("."), f"{same} of {turns}"
-        if "planner" in kinds:
-            yield from _functions(Path(folder), draw, turns)
-        for name, home in _homes(Path(folder)) if "folder" in kinds else ():
-            found = outcome(home, home=str(home))
+        whole.mkdir()
+        expected = jump(Path("/proc/nowhere"))
+        began = time.monotonic()
+        first = jump(whole)
+        longest = time.monotonic() - began
+        jump(whole, 60)  # a second plan
+        if first != expected or expected.startswith("exit"):
+            raise SystemExit(f"with a new cache folder: {first}; without one: {expected}")
+
+        def tried(kind: str, damage: Damage | None) -> bool:
+            home = Path(folder) / "copy"
+            shutil.copytree(whole, home)
+            if kind == "planner":  # with the plan nobody asks for the planner's functions
+                shutil.rmtree(home / "aloft" / "plans")
+            found = [p for p in sorted((home / "aloft" / kind).rglob("*")) if p.is_file()]
+            if damage is not None:
+                damage(found, draw)
+            else:
+                shutil.rmtree(home / "aloft" / kind)
+                jump(home, until=draw.uniform(0.2, longest))
+            same = bool(found) and jump(home) == expected
+            shutil.rmtree(home)
+            return same
+
+        for kind in (kind for kind in KINDS[:-1] if kind in kinds):
+            for damage in (*DAMAGES, None):
+                how = "Kill the run that fills it" if damage is None else damage.__doc__ or ""
+                same = sum(tried(kind, damage) for _ in range(turns))
+                yield kind, how.rstrip("."), f"{same} of {turns}"
+        for name, home, read_only in _homes(Path(folder), whole) if "folder" in kinds else ():
+            found = jump(home, read_only=read_only)
             yield "the cache folder", name, f"{int(found == expected)} of 1"
 
 
-def _functions(folder: Path, draw: random.Random, turns: int) -> Iterator[Sequence[str]]:
-    """Damage the planner's kept functions; a child evaluates them."""
-    evaluate = (
-        "from aloft.robots.description import find_robot;"
-        "from aloft.planner.models.symbolic_model import SymbolicModel;"
-        "from aloft.planner.problem.stage_functions import make_coordinates;"
-        "from aloft.planner.solving.kept_functions import load_pieces;"
-        "model = SymbolicModel(find_robot('bruce'));"
-        "sagittal = make_coordinates(model, 'sagittal');"
-        "pieces = load_pieces(model, sagittal, names=('stance', 'flight'));"
-        "import casadi as ca;"
-        "inputs = lambda f: [ca.DM.ones(f.sparsity_in(k)) * 0.1 for k in range(f.n_in())];"
-        "print([str(p.value(*inputs(p.value))) for p in pieces.values()])"
-    )
-
-    def evaluated(home: Path) -> str:
-        env = {**os.environ, "XDG_CACHE_HOME": str(home)}
-        done = subprocess.run(
-            [sys.executable, "-c", evaluate],
-            check=False,
-            env=env,
-            capture_output=True,
-            text=True,
-            timeout=900,
-        )
-        return done.stdout.strip() if not done.returncode else f"exit code {done.returncode}"
-
-    whole = folder / "planner"
-    expected = evaluated(whole)
-    for damage in DAMAGES:
-        same = 0
-        for turn in range(turns):
-            home = folder / f"planner-{damage.__name__}-{turn}"
-            shutil.copytree(whole, home)
-            damage(_files(home, "planner"), draw)
-            same += not expected.startswith("exit") and evaluated(home) == expected
-            shutil.rmtree(home)
-        yield "planner", (damage.__doc__ or "").rstrip("."), f"{same} of {turns}"
-
-
-def _homes(folder: Path) -> Iterator[tuple[str, Path]]:
-    yield "there is no such folder, and none can be made", Path("/proc/nowhere")
+def _homes(folder: Path, whole: Path) -> Iterator[tuple[str, Path, bool]]:
+    yield "there is no such folder, and none can be made", Path("/proc/nowhere"), False
     blocked = folder / "blocked"
     blocked.write_text("in the way")
-    yield "a file is in its place", blocked
+    yield "a file is in its place", blocked, False
+    bare = folder / "bare"
+    bare.mkdir()
+    yield "it is empty and cannot be written", bare, True
+    yield "it is full and cannot be written", whole, True
     if os.geteuid() == 0:
         theirs = folder / "theirs"
         (theirs / "aloft").mkdir(parents=True)
         os.chown(theirs / "aloft", 12345, -1)
-        yield "it belongs to another user", theirs
+        yield "it belongs to another user", theirs, False
 
 
 if __name__ == "__main__":
-    assert cache_root() is not None
     print("| " + " | ".join(HEAD) + " |\n|" + "---|" * len(HEAD))
     for row in rows(int(sys.argv[1]) if len(sys.argv) > 1 else 5, sys.argv[2:] or KINDS):
         print("| " + " | ".join(row) + " |", flush=True)

@@ -32,10 +32,8 @@ def test_every_number_of_a_table_is_its_data_files(script: ModuleType, file: Pat
         assert text.count(f"<!-- data: {file.stem} -->") == 1
         inside = script.between(text, file.stem)
         table, _, rest = inside.partition("\n*Stale: ")
-        assert table == (script.table_of(data) if "rows" in data else ""), (
-            "run: python lab/pages/study_data.py mark"
-        )
-        assert not rest or f"since commit {data['commit'][:8]}" in rest
+        assert table == script.inside_of(data), "run: python lab/pages/study_data.py mark"
+        assert not rest or f"since commit {script.since(data)[:8]}" in rest
 
 
 def results(folder: Path, runs: list[dict[str, Any]]) -> Path:
@@ -50,6 +48,7 @@ def results(folder: Path, runs: list[dict[str, Any]]) -> Path:
 def run(task: str, success: bool, tilt: float | None, reason: str) -> dict[str, Any]:
     return {
         "task": task, "arm": "one", "success": success, "final_tilt_deg": tilt, "reason": reason,
+        "seed": 5, "run_hash": f"hash of {task}",
     }  # fmt: skip
 
 
@@ -130,6 +129,39 @@ def test_cells_with_more_seeds_take_the_place_of_those_with_fewer(
         ("+x", 3, 3),
         ("+y", 1, 1),
     ]
+    (other := results(tmp_path / "other", [fall])).joinpath("summary.json").write_text(
+        json.dumps({"study": "paper_plans", "seeds": [5], "rows": [{"task": "+x"}]})
+    )
+    with pytest.raises(ValueError, match="these are of paper_pushes and of paper_plans"):
+        script.keep(tmp_path, [few, other], "0" * 40)
+
+
+def test_runs_that_are_made_again_the_same_are_not_stale(
+    script: ModuleType, tmp_path: Path
+) -> None:
+    (tmp_path / "docs" / "data").mkdir(parents=True)
+    folder = results(tmp_path / "found", [run(task, True, 0.1, "") for task in ("+x", "+x", "+y")])
+    file = script.keep(tmp_path, [folder], "0" * 40)
+    probes = json.loads(file.read_text())["probes"]
+    assert [each["run_hash"] for each in probes] == ["hash of +x", "hash of +y"]
+    asked = list[tuple[str, str]]()
+
+    def hashes(study: Path, probe: dict[str, Any]) -> list[str]:
+        asked.append((study.name, probe["where"]["task"]))
+        return ["hash of another direction", f"hash of {probe['where']['task']}"]
+
+    differ = script.probe(tmp_path, ["paper_pushes"], "1" * 40, lambda *_: ["hash of +x"])
+    assert differ == ["paper_pushes: {'task': '+y'}, seed 5, runs otherwise"]
+    assert "same_at" not in json.loads(file.read_text())
+    assert script.probe(tmp_path, ["paper_pushes"], "1" * 40, hashes) == []
+    assert asked == [("paper_pushes.yaml", "+x"), ("paper_pushes.yaml", "+y")]
+    data = json.loads(file.read_text())
+    assert script.since(data) == data["same_at"] == "1" * 40
+    script.keep(tmp_path, [folder], "0" * 40)
+    assert json.loads(file.read_text()) == data, "more seeds of the same code need no new probes"
+    assert script.made_line(data).endswith(
+        "With the code of commit 11111111 the 2 of them that were run again are the same to the last bit."
+    )
 
 
 def git(root: Path, *arguments: str) -> str:
@@ -166,7 +198,9 @@ def test_a_table_is_stale_when_what_it_measures_has_changed(
     assert script.stale(tmp_path) == {"x": ["blocks/law.py"]}
     script.write_tables(tmp_path)
     page = (tmp_path / "docs" / "page.md").read_text()
-    line = f"*Stale: since commit {commit[:8]}, with which this was measured, `blocks/law.py` changed.*"
+    line = (
+        f"*Stale: since commit {commit[:8]}, whose code made these runs, `blocks/law.py` changed.*"
+    )
     assert line in page
     git(tmp_path, "commit", "-qam", "two")
     assert script.stale(tmp_path) == {"x": ["blocks/law.py"]}, "also when that is committed"

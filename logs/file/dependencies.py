@@ -13,7 +13,7 @@ import os
 import subprocess
 import zlib
 from base64 import b64decode, b64encode
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
@@ -70,17 +70,14 @@ def digests(files: Mapping[str, Path]) -> dict[str, str]:
 
 def contents(files: Mapping[str, Path]) -> dict[str, str]:
     """Return the content of files as text, by SHA-256, as far as ``MOST_CARRIED`` allows."""
-    return dict(_contents(files))
-
-
-def _contents(files: Mapping[str, Path]) -> Iterator[tuple[str, str]]:
-    room = MOST_CARRIED
+    found, room = {}, MOST_CARRIED
     for path in files.values():
         data = path.read_bytes()
         packed = zlib.compress(data, 6)
         if len(packed) <= room:
             room -= len(packed)
-            yield sha256(data).hexdigest(), b64encode(packed).decode()
+            found[sha256(data).hexdigest()] = b64encode(packed).decode()
+    return found
 
 
 def unpacked(content: str) -> bytes:

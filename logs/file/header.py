@@ -34,16 +34,15 @@ _NOTHING = RecordedLayout((), {}, {}, 0)
 def header_of(bound: BoundGraph) -> Header:
     """Make the header of a run of ``bound``, as its memory is now."""
     memory, graph = bound.memory, bound.graph
-    header = make_header(
+    return make_header(
         graph,
         memory.bus.layout,
         memory.bus.buffer.tobytes(),
         state=memory.state.layout,
         first_tick=bound.clock.tick,
         clock=bound.clock.kind,
+        files=files_read(bound),
     )
-    files = files_read(bound)
-    return replace(header, files=digests(files), contents=contents(files))
 
 
 def make_header(
@@ -54,9 +53,11 @@ def make_header(
     state: Layout | None = None,
     first_tick: int = 0,
     clock: str = "",
+    files: Mapping[str, Path] | None = None,
 ) -> Header:
-    """Make the header of a run of ``graph``; without ``state``, one that can hold no keyframes."""
-    files = parameter_files(graph)
+    """Make the header of a run of ``graph``; without ``state``, one that can hold no keyframes. By default only
+    the ``files`` that parameters name are known."""
+    files = parameter_files(graph) if files is None else files
     written = graph.resolved.blocks if graph.resolved is not None else ()
     foreign = {block.path for block in written if needs_code(block, graph.robot)}
     return Header(

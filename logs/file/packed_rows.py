@@ -7,7 +7,7 @@ from bisect import bisect_left
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,12 +49,10 @@ class PackedGroup:
         """Return the ticks of a piece, (n,)."""
         return np.arange(piece.first, piece.last + 1, self._part.period, dtype=np.int64)
 
-    def unpack(
-        self, piece: Record, part: tuple[int, int] | None = None, file: BinaryIO | None = None
-    ) -> NDArray[np.uint8]:
+    def unpack(self, piece: Record, part: tuple[int, int] | None = None) -> NDArray[np.uint8]:
         """Unpack the rows (n, bytes) of a piece, or of each row the bytes ``part`` only."""
         found = self._found
-        packed = found.payload(piece) if file is None else found.read_payload(file, piece)
+        packed = found.payload(piece)
         try:
             first, rows = unpack(packed) if part is None else unpack_bytes(packed, *part)
             last = first + (len(rows) - 1) * self._part.period
@@ -79,7 +77,9 @@ class PackedGroup:
                 f"expected number is {MOST_TICKS} in each at most"
             )
         found = [self.ticks_of(piece) for piece in self._pieces]
-        return np.unique(np.concatenate([np.zeros(0, np.int64), *found]))
+        ticks = np.concatenate([np.zeros(0, np.int64), *found])
+        in_order = bool((ticks[1:] > ticks[:-1]).all())
+        return ticks if in_order else np.unique(ticks)
 
     def between(self, first: int, last: int) -> Iterator[Record]:
         """Yield the pieces with ticks from ``first`` up to, without, ``last``."""

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from ...robots.robot_description import RobotDescription
 from ...runtime.language.layout import only_field
 from ...runtime.running.sink import Note
 from ...runtime.running.snapshot import Snapshot
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
 
 __all__ = ["RecordedRun", "RecordingError", "read"]
 
+LAST_WITHOUT_NAME = "0.2.0 as it was before 28 November 2026"
+"""The version of aloft that reads the formats up to 5, whose files do not name the version that wrote them."""
 READ_ALONE = 3
 """Signals that are each taken from the file for themselves. Who asks for more wants many, and one
 reading of everything is faster then."""
@@ -94,14 +97,16 @@ class RecordedRun:
         Raises:
             KeyError: there is no such signal; the message has the nearest names.
         """
-        known = self.signals()
-        if name not in known:
-            name = only_field(name, known) or self.nearest(name)
-        self._asked.add(name)
+        field = self._field(name)
+        self._asked.add(field.name)
         whole = len(self.ticks) * self.header.bus.size
         if "rows" in self.__dict__ or (len(self._asked) > READ_ALONE and whole <= MOST_KEPT):
-            return self.header.bus.layout().view(self.rows, name)
-        return self._source.signal(known[name])
+            return self.header.bus.layout().view(self.rows, field.name)
+        return self._source.signal(field)
+
+    def _field(self, name: str) -> RecordedField:
+        known = self.signals()
+        return known[name if name in known else only_field(name, known) or self.nearest(name)]
 
     def samples(self, name: str) -> tuple[NDArray[np.int64], NDArray[Any]]:
         """Return the ticks at which a signal is kept, (n,), and its values there, (n, ...): a large field of a
@@ -110,10 +115,7 @@ class RecordedRun:
         Raises:
             KeyError: there is no such signal; the message has the nearest names.
         """
-        known = self.signals()
-        if name not in known:
-            name = only_field(name, known) or self.nearest(name)
-        return self._source.samples(known[name])
+        return self._source.samples(self._field(name))
 
     @cached_property
     def _asked(self) -> set[str]:
@@ -305,7 +307,7 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
         )
         outcome = json.loads(texts[Content.OUTCOME]) if Content.OUTCOME in texts else None
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        reason = " ".join(str(error).split())
+        reason = _reason(error)
         raise RecordingError(f"{path} has a header that aloft does not write: {reason}") from error
     run = RecordedRun(path, header, outcome, notes, found)
     if found.rewritten is not None and not damaged:
@@ -313,13 +315,25 @@ def read(path: str | PathLike[str], *, damaged: bool = False) -> RecordedRun:
     return run
 
 
+def _reason(error: Exception) -> str:
+    """Return in one line what is wrong with a header."""
+    from pydantic import ValidationError
+
+    if isinstance(error, ValidationError):
+        from ...files.validation import describe
+
+        return describe(error.errors(include_url=False)[0], RobotDescription)
+    return " ".join(str(error).split())
+
+
 def _expect_format(path: Path, number: Any, maker: str) -> None:
     """Raise ``RecordingError`` for a file of another format."""
     if number == FORMAT:
         return
     newer = isinstance(number, int) and number > FORMAT
-    fix = f"update aloft to {maker or 'a newer one'}" if newer else (
-        f"read it with aloft {maker}" if maker else "read it with an older one"
+    fix = (
+        f"update aloft to {maker or 'a newer one'}" if newer
+        else f"read it with aloft {maker or LAST_WITHOUT_NAME}"
     )  # fmt: skip
     raise RecordingError(f"{path} has format {number}, this version of aloft reads {FORMAT}; {fix}")
 

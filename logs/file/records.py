@@ -109,7 +109,7 @@ class Record:
 
     @property
     def end(self) -> int:
-        """Where the payload ends."""
+        """End of the payload."""
         return self.place + _PAYLOAD + self.size
 
     def head(self) -> bytes:
@@ -195,19 +195,12 @@ class Scan:
         """Return the records with that content."""
         return [record for record in self.records if record.content in contents]
 
-    def opened(self) -> BinaryIO:
-        """Open what the records' places are in."""
-        return self.path.open("rb") if self.rewritten is None else io.BytesIO(self.rewritten)
-
     def payload(self, record: Record) -> bytes:
         """Read a record, and verify it once more. Raises ``RecordingError``."""
-        with self.opened() as file:
-            return self.read_payload(file, record)
-
-    def read_payload(self, file: BinaryIO, record: Record) -> bytes:
-        """Do so with the open file."""
-        file.seek(record.place + _PAYLOAD)
-        hidden = file.read(record.size)
+        written = self.path.open("rb") if self.rewritten is None else io.BytesIO(self.rewritten)
+        with written as file:
+            file.seek(record.place + _PAYLOAD)
+            hidden = file.read(record.size)
         if len(hidden) < record.size or zlib.crc32(hidden) != record.crc:
             raise self.unreadable(record, "it has changed while it was read")
         return _masked(hidden, record.salt, _HEAD.size + _CHECK.size)

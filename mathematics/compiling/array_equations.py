@@ -379,6 +379,7 @@ class ArrayEquations(Slices):
     def _check_overlap(self, node: ast.stmt, target: ast.Subscript, value: ast.expr) -> None:
         """Refuse a target that the value still reads after it has been written."""
         written = self._place_of(target)
+        shown = self._root(target) if written.array in self._own else written.array
 
         def visit(each: ast.expr, summed: bool) -> None:
             if isinstance(each, ast.Name | ast.Attribute | ast.Subscript):
@@ -386,15 +387,15 @@ class ArrayEquations(Slices):
                 if not isinstance(kind, ArrayKind) or self._path(each) != written.array:
                     return
                 if summed:
-                    text = f"{written.array} is written while @ still reads it; use another array"
+                    text = f"{shown} is written while @ still reads it; use another array"
                     raise self._error(node, text)
                 roots = {self._root(each), self._root(target)}
                 if len(roots) > 1 and roots & self._partial:
-                    text = f"{written.array} is written while a part of it is read by another name"
+                    text = f"{shown} is written while a part of it is read by another name"
                     raise self._error(node, f"{text}; use another array")
                 turned = any(isinstance(a, ast.Attribute) and a.attr == "T" for a in ast.walk(each))
                 if turned or not _apart_or_same(written, self._place_of(each)):
-                    text = f"{written.array} is written while another part of it is read"
+                    text = f"{shown} is written while another part of it is read"
                     raise self._error(node, f"{text}; use another array")
                 return
             within = summed or (isinstance(each, ast.BinOp) and isinstance(each.op, ast.MatMult))
@@ -441,6 +442,8 @@ class ArrayEquations(Slices):
             node = node.value
         return node.id if isinstance(node, ast.Name) else ""
 
+    _own: set[str]
+    """Names of arrays of the kernel's own."""
     _partial: set[str]
     """Names of parts of arrays: ``x`` of ``x = state.x[1:]``."""
     _aliases: dict[str, str]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import copy
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -16,6 +17,7 @@ import numpy as np
 
 from .array_equations import ArrayEquations
 from .expressions import NUMBERS, cloned, numbers
+from .kernel_registry import is_kernel
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind
 from .slices import called
 
@@ -29,10 +31,18 @@ _NUMBER_FUNCTIONS: dict[Any, str] = {
         "maximum", "minimum", "clip", "sign", "sqrt", "sin", "cos", "tan", "exp", "expm1", "log", "tanh", "arccos",
         "arcsin", "arctan", "arctan2", "hypot", "floor", "ceil", "trunc", "rint", "isnan", "isfinite", "isinf",
     )
-}  # fmt: skip
+} | {np.round: "rint"}  # fmt: skip
 _OPERATIONS: dict[Any, ast.operator] = {
-    np.add: ast.Add(), np.subtract: ast.Sub(), np.multiply: ast.Mult(), np.divide: ast.Div(),
-    np.power: ast.Pow(), np.floor_divide: ast.FloorDiv(), np.mod: ast.Mod(),
+    np.add: ast.Add(),
+    np.subtract: ast.Sub(),
+    np.multiply: ast.Mult(),
+    np.divide: ast.Div(),
+    np.power: ast.Pow(),
+    np.floor_divide: ast.FloorDiv(),
+    np.mod: ast.Mod(),
+}
+_FACTORS: dict[Any, float] = {
+    np.deg2rad: math.pi / 180.0, np.radians: math.pi / 180.0, np.rad2deg: 180.0 / math.pi, np.degrees: 180.0 / math.pi,
 }  # fmt: skip
 _COMPARISONS: dict[Any, ast.cmpop] = {
     np.less: ast.Lt(), np.greater: ast.Gt(), np.less_equal: ast.LtE(), np.greater_equal: ast.GtE(),
@@ -70,6 +80,10 @@ _TEXTS = {
 """The statements before the loop over all elements E of an array, and in it; the result is ``total``."""
 
 
+_NUMBER_CALLS = {float, int, bool, abs, min, max, len, round, range}
+"""Functions of Python that a kernel may call."""
+
+
 class ArrayFunctions(ArrayEquations):
     """Replaces calls of functions of arrays by what equations are made of."""
 
@@ -101,6 +115,9 @@ class ArrayFunctions(ArrayEquations):
                 node.value = self._new_array(inner)
         return node
 
+    _foreign: set[str]
+    """Names of what functions have made that kernels do not know."""
+
     def _is_array(self, node: ast.expr) -> bool:
         kind = self._kind(node)
         return isinstance(kind, ArrayKind) and kind.rank > 0
@@ -118,7 +135,7 @@ class ArrayFunctions(ArrayEquations):
         if function in _MAKERS and not self._is_unknown(kinds):
             return _MAKERS[function](self, node)
         if node.keywords:
-            return node
+            return self._along_axis(node, _REDUCTIONS.get(function, ""), arguments)
         known = bool(kinds) and all(isinstance(kind, ArrayKind | NumberKind) for kind in kinds)
         if not known:
             return node
@@ -130,6 +147,8 @@ class ArrayFunctions(ArrayEquations):
             return ast.Compare(arguments[0], [copy.copy(_COMPARISONS[function])], [arguments[1]])
         if function in (np.absolute, np.fabs) and len(arguments) == 1:
             return called("abs", *arguments)
+        if function in _FACTORS and len(arguments) == 1:
+            return ast.BinOp(arguments[0], ast.Mult(), ast.Constant(_FACTORS[function]))
         if function is np.negative and len(arguments) == 1:
             return ast.UnaryOp(ast.USub(), arguments[0])
         if function is np.square and len(arguments) == 1:
@@ -166,7 +185,7 @@ class ArrayFunctions(ArrayEquations):
         """``u.v.sum()`` and so on."""
         array, name = function.value, function.attr
         if node.keywords:
-            return node
+            return self._along_axis(node, name if name in _METHODS else "", [array, *node.args])
         if name == "dot" and len(node.args) == 1 and self._is_array(node.args[0]):
             return ast.BinOp(array, ast.MatMult(), node.args[0])
         if name == "copy" and not node.args:
@@ -185,6 +204,62 @@ class ArrayFunctions(ArrayEquations):
             raise self._error(node, "np.outer takes two vectors")
         made = ast.Call(ast.Name("<outer>", ast.Load()), node.args, [])
         return self._filled(node, ArrayKind((a.shape[0], b.shape[0]), float), made)
+
+    def _write_out(self, node: ast.Assign) -> None:
+        """``M[0] = [a, b, c]`` writes an array of these numbers; ``a, b, c = u`` reads the elements of ``u``."""
+        target, value = node.targets[0], node.value
+        if isinstance(target, ast.Subscript) and isinstance(value, ast.List | ast.Tuple):
+            if self._is_array(target):
+                call = ast.copy_location(ast.Call(value, [value], []), value)
+                node.value = self._made_array(call)
+        elif isinstance(target, ast.Tuple):
+            kind = self._kind(value)
+            if isinstance(kind, ArrayKind) and kind.shape == (len(target.elts),):
+                if not isinstance(value, ast.Name | ast.Attribute):
+                    value = self._new_array(value)
+                places = (ast.Constant(k) for k in range(len(target.elts)))
+                elements: list[ast.expr] = [
+                    ast.Subscript(cloned(value), place, ast.Load()) for place in places
+                ]
+                node.value = ast.Tuple(elements, ast.Load())
+                for each in ast.walk(node.value):
+                    ast.copy_location(each, value)
+
+    def _is_foreign(self, target: ast.expr, value: ast.expr, whole: bool) -> bool:
+        """Return whether an equation has a function that makes an array, and that kernels do not know:
+        it stays as it is, for NumPy and plain Python. ``whole``: a target that is an array by itself is written into."""
+        if isinstance(target, ast.Name) and not whole:
+            foreign = self._makes_foreign(value)
+            (self._foreign.add if foreign else self._foreign.discard)(target.id)
+            return foreign
+        if self._mask_of(target) is not None:
+            return False
+        if not (self._is_array(target) if whole else self._covers_elements(target)):
+            return False
+        return self._makes_foreign(value)
+
+    def _mask_of(self, target: ast.expr) -> ast.expr | None:
+        """Find the mask of ``y[u > 0.0]``."""
+        raise NotImplementedError
+
+    def _makes_foreign(self, value: ast.expr) -> bool:
+        for each in ast.walk(value):
+            if isinstance(each, ast.Name) and each.id in self._foreign:
+                return True
+            if (
+                isinstance(each, ast.Call)
+                and not self._applies_to_elements(each)
+                and not self._is_cross(each)
+            ):
+                function = self._resolved(each.func)
+                known = function is not None and (is_kernel(function) or function in _NUMBER_CALLS)
+                takes_arrays = any(map(self._is_array, each.args)) or (
+                    isinstance(each.func, ast.Attribute) and self._is_array(each.func.value)
+                )
+                module = getattr(function, "__module__", "") or ""
+                if not known and (takes_arrays or module.startswith("numpy")):
+                    return True
+        return False
 
     # Numbers of whole arrays
 
@@ -238,6 +313,42 @@ class ArrayFunctions(ArrayEquations):
             assert isinstance(total, ast.Name)
             self._kinds[total.id] = NUMBER
         return total
+
+    def _along_axis(self, node: ast.Call, name: str, arguments: Sequence[ast.expr]) -> ast.expr:
+        """``np.sum(A, axis=1)``: one number for each row, or for each column."""
+        keyword = node.keywords[0]
+        axis = self._constant_of(keyword.value) if keyword.arg == "axis" else None
+        if not name or axis not in (0, 1, -1) or len(node.keywords) + len(arguments) > 2:
+            return node
+        kind = self._kind(arguments[0])
+        if not isinstance(kind, ArrayKind) or kind.rank != 2:
+            return node
+        array = arguments[0]
+        if not isinstance(array, ast.Name | ast.Attribute):
+            array = self._new_array(array)
+        kept = 1 if axis == 0 else 0
+        element: type = bool if name in ("any", "all") else int if name.startswith("arg") else float
+        if kind.element is not float and name in ("sum", "prod", "max", "min"):
+            element = kind.element if name in ("max", "min") else int
+        made = self._room(node, ArrayKind((kind.shape[kept],), element))
+        row = self._name("i")
+        self._kinds[row] = NUMBER
+        self._counters.add(row)
+        place, whole = ast.Name(row, ast.Load()), ast.Slice()
+        index = ast.Tuple([whole, place] if axis == 0 else [place, whole], ast.Load())
+        part = ast.Subscript(cloned(array), index, ast.Load())
+        for each in ast.walk(part):
+            ast.copy_location(each, node)
+        ahead, self._ahead = self._ahead, []
+        total = self._reduced(node, name, part)
+        target = ast.Subscript(ast.Name(made.id, ast.Load()), cloned(place), ast.Store())
+        self._put_ahead(ast.Assign([target], self._expression(total)), node)
+        body, self._ahead = self._ahead, ahead
+        size = ast.Constant(int(kind.shape[kept] or 0))
+        self._put_ahead(
+            ast.For(ast.Name(row, ast.Store()), called("range", size), body, [], None), node
+        )
+        return made
 
     def _without_cross(self, value: ast.expr) -> ast.expr:
         """Compute the cross products in a value ahead, where no equation does."""
@@ -297,9 +408,6 @@ class ArrayFunctions(ArrayEquations):
         self._kinds[made.id] = kind._replace(shape=tuple(int(size) for size in sizes))
         self._own.add(made.id)
         return made
-
-    _own: set[str]
-    """Names of arrays of the kernel's own."""
 
     def _shape_in(self, node: ast.Call) -> tuple[int, ...]:
         """Read the shape that a call asks for. Raises ``EquationError``: it is not constant."""

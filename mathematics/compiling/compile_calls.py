@@ -13,11 +13,11 @@ from ...processes.child_process import ChildProcess
 from ..kernel import kernels
 from . import shipped, store
 from .arguments import ArgumentType, pack, type_of
+from .failures import CompileError
 from .fingerprint import fingerprint
 from .kernel_call import KernelCall
 from .machine_code import MachineCode, optimised, tools
 from .sharing import CompileJob, divide, helpers, processors
-from .translate import CompileError, Translator
 
 Watcher = Callable[[int, int], None]
 
@@ -95,6 +95,8 @@ class _Compilation:
         refused: list[str] = []
         if not missing:
             return refused
+        from .translate import Translator  # which most starts do without
+
         translator = Translator()
         jobs: list[CompileJob] = []
         for name, k in missing.items():

@@ -26,16 +26,12 @@ from enum import IntEnum
 from types import CodeType
 from typing import Any
 
-from .array_loops import ArrayLoops
+from .carried_arrays import CarriedArrays
 from .expressions import EquationError as EquationError  # noqa: PLC0414  also imported from here
 from .expressions import cloned, indices_of, shown
-from .expressions import cross as cross  # noqa: PLC0414
-from .kernel_registry import is_kernel, written_code
+from .kernel_registry import is_kernel, reports_event, written_code
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kinds
 from .slices import Cut, counters_of
-
-VERSION = 5
-"""Counts changes of what a statement is rewritten into: machine code made before is not used."""
 
 
 def expanded_code(function: Any, code: CodeType) -> CodeType:
@@ -122,18 +118,11 @@ EVENT = "event_"
 """Name of the argument by which a block's step requests a call of Python after it."""
 
 
-def reports_event(function: Any) -> bool:
-    """Return whether a kernel is a block's step that returns whether ``on_event`` is to be
-    called."""
-    returns = function.__annotations__.get("return")
-    return hasattr(function, "declared_kinds") and returns in ("bool", bool)
-
-
 def _event_place() -> ast.expr:
     return ast.Subscript(ast.Name(EVENT, ast.Load()), ast.Constant(0), ast.Store())
 
 
-class _Rewriter(ArrayLoops):
+class _Rewriter(CarriedArrays):
     """Rewrites the statements of one function, from the first to the last."""
 
     def __init__(self, function: Any, file: str) -> None:
@@ -144,9 +133,7 @@ class _Rewriter(ArrayLoops):
         self._cuts: dict[str, Cut] = {}
         self._partial: set[str] = set()
         self._own: set[str] = set()
-        self._depth = 0
-        """The number of loops around the present statement."""
-        self._own_of_loops: set[str] = set()
+        self._foreign: set[str] = set()
         self._checks = False
         self.calls: list[tuple[Any, dict[str, Kind]]] = []
         """The kernels that are called, with what they get; of a check only."""
@@ -182,12 +169,24 @@ class _Rewriter(ArrayLoops):
         made: list[ast.stmt] = []
         for statement in statements:
             outer, self._ahead, self._cuts = self._ahead, [], {}
-            rewritten = self._statement(statement)
+            if self._depth:
+                rewritten = self._statement(statement)
+            else:
+                before, self._before_loop = self._before_loop, []
+                rewritten = self._statement(statement)
+                made += self._before_loop
+                self._before_loop = before
             made += [*self._ahead, *rewritten]
             self._ahead = outer
         return made
 
     def _statement(self, node: ast.stmt) -> list[ast.stmt]:
+        if isinstance(node, ast.For | ast.While) and not self._depth:
+            self._look_through_loop(node)
+        if isinstance(node, ast.AnnAssign) and node.value is not None:
+            node = ast.copy_location(ast.Assign([node.target], node.value), node)
+        if isinstance(node, ast.Assign) and self._depth:
+            self._keep_what_is_carried(node)
         if isinstance(node, ast.While):
             self._ahead = None
             node.test = self._expression(self._canonical(node.test))
@@ -203,11 +202,15 @@ class _Rewriter(ArrayLoops):
         if isinstance(node, ast.Assign) and len(node.targets) > 1:
             return self._assign_in_turn(node)
         if isinstance(node, ast.Assign):
-            if kept is not None and self._is_foreign(node.targets[0], node.value):
+            self._write_out(node)
+        if isinstance(node, ast.Assign):
+            if kept is not None and self._is_foreign(
+                node.targets[0], node.value, isinstance(node.targets[0], ast.Subscript)
+            ):
                 return [kept]
             return self._assign(node, node.targets[0])
         if isinstance(node, ast.AugAssign):
-            if kept is not None and self._is_foreign(node.target, node.value):
+            if kept is not None and self._is_foreign(node.target, node.value, True):
                 return [kept]
             return self._augment(node)
         if isinstance(node, ast.For):
@@ -224,9 +227,6 @@ class _Rewriter(ArrayLoops):
                 node.value = None
                 return [ast.copy_location(written, node), node]
             return [node]
-        if isinstance(node, ast.AnnAssign) and node.value is not None:
-            plain = ast.copy_location(ast.Assign([node.target], node.value), node)
-            return self._assign(plain, node.target)
         for field, value in ast.iter_fields(node):
             if isinstance(value, ast.expr):
                 setattr(node, field, self._expression(value))
@@ -246,25 +246,6 @@ class _Rewriter(ArrayLoops):
         if isinstance(node, ast.Try):
             node.orelse, node.finalbody = self.body(node.orelse), self.body(node.finalbody)
         return [node]
-
-    def _is_foreign(self, target: ast.expr, value: ast.expr) -> bool:
-        """Return whether an equation has a function that makes an array, and that kernels do not know:
-        it stays as it is, for NumPy and plain Python."""
-        if not self._covers_elements(target):
-            return False
-        for each in ast.walk(value):
-            if (
-                isinstance(each, ast.Call)
-                and not self._applies_to_elements(each)
-                and not self._is_cross(each)
-            ):
-                function = self._resolved(each.func)
-                known = function is not None and (is_kernel(function) or function in _NUMBER_CALLS)
-                takes_arrays = any(map(self._is_array, each.args))
-                module = getattr(function, "__module__", "") or ""
-                if not known and (takes_arrays or module.startswith("numpy")):
-                    return True
-        return False
 
     def _assign_in_turn(self, node: ast.Assign) -> list[ast.stmt]:
         """Write ``a = b = value``, the targets one after the other."""
@@ -319,32 +300,6 @@ class _Rewriter(ArrayLoops):
         node.targets = [self._target(target)]
         return [node]
 
-    def _note_alias(self, node: ast.Assign, name: str, value: ast.expr) -> None:
-        """Note that a name stands for an array, or a part of one."""
-        self._aliases.pop(name, None)
-        self._partial.discard(name)
-        self._own_of_loops.discard(name)
-        if not self._is_array(value):
-            return
-        if not isinstance(value, ast.Name | ast.Attribute | ast.Subscript):
-            if self._depth and not self._chooses(value):
-                self._own_of_loops.add(name)
-            return
-        if isinstance(value, ast.Name) and value.id in self._own_of_loops:
-            text = f"{name} would keep an array that the loop makes anew; make both before the loop"
-            raise self._error(node, text)
-        if isinstance(value, ast.Name) and value.id in self._own and self._depth:
-            self._own_of_loops.add(name)
-        path = self._path(value)
-        if path and path != name:
-            self._aliases[name] = path
-            if (
-                isinstance(value, ast.Subscript)
-                or self._root(value) in self._partial
-                or (isinstance(value, ast.Attribute) and value.attr == "T")
-            ):
-                self._partial.add(name)
-
     def _augment(self, node: ast.AugAssign) -> list[ast.stmt]:
         mask = self._mask_of(node.target)
         if mask is not None:
@@ -359,6 +314,10 @@ class _Rewriter(ArrayLoops):
         ):
             kind, target = self._kind(node.target), node.target
             assert isinstance(kind, ArrayKind)
+            if isinstance(node.value, ast.List | ast.Tuple):
+                node.value = self._made_array(
+                    ast.copy_location(ast.Call(target, [node.value], []), node)
+                )
             if not self._covers_elements(target):  # x += 1.0 of a whole array
                 own = indices_of(target) if isinstance(target, ast.Subscript) else []
                 base = target.value if isinstance(target, ast.Subscript) else _loaded(target)
@@ -448,10 +407,6 @@ class _Rewriter(ArrayLoops):
         if isinstance(kind, ArrayKind) and kind.rank and not self._chooses(node):
             return self._new_array(node)
         return self._expression(node)
-
-    def _chooses(self, node: ast.expr) -> bool:
-        """Return whether an expression hands on one of two arrays: ``a if flag else b``."""
-        return isinstance(node, ast.IfExp) and not self._is_array(node.test)
 
     def _inside(self, node: ast.expr) -> ast.expr:
         """Rewrite the array that a part is taken of: only its indices are numbers."""
@@ -579,6 +534,3 @@ def _called(name: str, argument: ast.expr, place: ast.AST) -> ast.expr:
     for each in (call, call.func):
         ast.copy_location(each, place)
     return call
-
-
-_NUMBER_CALLS = {float, int, bool, abs, min, max, len, round, range}

@@ -22,6 +22,9 @@ from .kinds import (
     argument_kinds,
 )
 
+VERSION = 9
+"""Counts changes of what a statement is rewritten into: machine code made before is not used."""
+
 Node = TypeVar("Node", bound=ast.AST)
 
 
@@ -90,7 +93,7 @@ class Expressions:
                 return whole.parts.get(node.attr)
             if isinstance(whole, ArrayKind) and node.attr == "T":
                 return ArrayKind(whole.shape[::-1], whole.element)
-            return None
+            return NUMBER if isinstance(self._resolved(node), float) else None  # such as np.pi
         if isinstance(node, ast.Subscript):
             return self._kind_of_part(node)
         if isinstance(node, ast.BinOp):
@@ -200,6 +203,9 @@ class Expressions:
             return NUMBER if numbers_only and not is_slice(node.slice) else None
         shape: list[int | None] = []
         indices = indices_of(node)
+        if any(isinstance(each, ast.Constant) and each.value is None for each in indices):
+            text = f"{ast.unparse(node)}: None adds a dimension; write np.outer, or a loop"
+            raise self._error(node, text)
         if len(indices) > whole.rank:
             text = f"{ast.unparse(node)}: {len(indices)} indices for {whole.rank} dimensions"
             raise self._error(node, text)
@@ -214,6 +220,9 @@ class Expressions:
     def _check_index(self, node: ast.Subscript, index: ast.expr, size: int | None, k: int) -> None:
         """Refuse an index that is always beyond an array, and one that is an array."""
         kind = self._kind(index)
+        if isinstance(index, ast.List):
+            text = f"{ast.unparse(node)}: an index is a number; take one row, or element, after the other"
+            raise self._error(node, text)
         if isinstance(kind, ArrayKind) and kind.rank:
             text = f"{ast.unparse(node)}: an index is a number; write a loop"
             if kind.element is bool:

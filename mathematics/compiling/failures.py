@@ -1,4 +1,4 @@
-"""Failures of compiled code, which end a run."""
+"""Failures of compiled code, which end a run, and of compiling."""
 
 from __future__ import annotations
 
@@ -29,6 +29,10 @@ FAILURES: dict[Failure, tuple[type[Exception], str]] = {
     ),
 }
 """The error that Python would raise, and what is said of the kernel."""
+
+
+class CompileError(Exception):
+    """A kernel cannot be compiled; the text gives kernel, place and reason."""
 
 
 class Site(NamedTuple):

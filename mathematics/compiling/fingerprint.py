@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from .arguments import ArgumentType
-from .equations import VERSION, reports_event
-from .kernel_registry import is_kernel, written_code
+from .expressions import VERSION
+from .kernel_registry import is_kernel, reports_event, written_code
 from .kinds import argument_kinds
 from .store import file_digest
 

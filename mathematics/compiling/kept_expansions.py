@@ -11,7 +11,6 @@ from types import CodeType
 from typing import Any
 
 from ...files.cache import Cache
-from .equations import expanded_code
 from .expressions import NUMBERS, numbers
 from .fingerprint import fingerprint
 
@@ -31,7 +30,7 @@ def kept_expansion(function: Any, code: CodeType) -> CodeType:
     try:
         name = fingerprint(function, (), f"{made_by}; {lines}")
     except (OSError, TypeError, ValueError):
-        return expanded_code(function, code)
+        return _made(function, code)
     kept = EXPANSIONS.load(name)
     if kept is not None:
         with suppress(EOFError, TypeError, ValueError):
@@ -39,9 +38,16 @@ def kept_expansion(function: Any, code: CodeType) -> CodeType:
             if NUMBERS in _names(found):
                 function.__globals__.setdefault(NUMBERS, numbers())
             return found
-    made = expanded_code(function, code)
+    made = _made(function, code)
     EXPANSIONS.save(name, marshal.dumps(made))
     return made
+
+
+def _made(function: Any, code: CodeType) -> CodeType:
+    # What rewrites code is imported where there is none that is kept.
+    from .equations import expanded_code
+
+    return expanded_code(function, code)
 
 
 def _names(code: CodeType) -> set[str]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from .arguments import ArgumentType, RecordType
 from .array_code import SIZE_BITS, FunctionCode
-from .failures import Failure, Site
+from .failures import CompileError, Failure, Site
 from .known_functions import ELEMENTWISE, FUNCTIONS, write_elements, write_product
 from .llvm_code import (
     BOOL,
@@ -26,10 +26,6 @@ from .llvm_code import (
     number,
     tuple_of,
 )
-
-
-class CompileError(Exception):
-    """A kernel cannot be compiled; the text gives kernel, place and reason."""
 
 
 class Translated(NamedTuple):
@@ -167,6 +163,10 @@ class ExpressionTranslator:
             return self._fixed[name]
         if name not in self._rooms:
             raise NotCompilable(f"{name} is read before it is assigned")
+        if len(self._rooms[name]) != len(leaves(self._types[name])):
+            raise NotCompilable(
+                f"{name} is another part of an array in each round; copy it, as in {name} = {name}.copy()"
+            )
         value = self._code.load(self._types[name], self._rooms[name])
         if name not in self._only_counters:
             return value
@@ -325,7 +325,8 @@ class ExpressionTranslator:
 
     def _call(self, node: ast.Call) -> Value:
         if node.keywords or any(isinstance(each, ast.Starred) for each in node.args):
-            raise NotCompilable("a kernel passes arguments by position")
+            text = "a kernel passes arguments by position; write a loop, or put it into an @numba.njit function"
+            raise NotCompilable(f"{ast.unparse(node)[:80]}: {text}")
         if not self._is_outer(node.func):
             raise NotCompilable(f"{ast.unparse(node.func)} is {_NOT_CALLED}")
         function = self._outer(node.func)

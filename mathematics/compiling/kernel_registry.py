@@ -41,6 +41,13 @@ def written_code(function: Any) -> CodeType:
     return code
 
 
+def reports_event(function: Any) -> bool:
+    """Return whether a kernel is a block's step that returns whether ``on_event`` is to be
+    called."""
+    returns = function.__annotations__.get("return")
+    return hasattr(function, "declared_kinds") and returns in ("bool", bool)
+
+
 def arguments_of(function: Any) -> tuple[str, ...]:
     """Return the names of a function's arguments."""
     code = written_code(function)

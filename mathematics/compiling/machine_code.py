@@ -9,7 +9,6 @@ import re
 from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import import_module
-from importlib.metadata import version
 from itertools import count
 from typing import Any
 
@@ -40,11 +39,22 @@ def tools() -> str:
 
     names = (
         f"python {platform.python_version()}",
-        f"llvmlite {version('llvmlite')}",
+        f"llvmlite {llvm_version()}",
         f"{process_triple()} {' '.join(processor())}",
         OPTIONS,
     )
     return "; ".join(names)
+
+
+def llvm_version() -> str:
+    """Return llvmlite's version, which its package tells sooner than a search through all that are installed.
+
+    Raises:
+        ImportError: there is no LLVM.
+    """
+    import llvmlite
+
+    return str(llvmlite.__version__)
 
 
 _HOSTS = Cache("processors")
@@ -55,7 +65,7 @@ def _host() -> tuple[str, str, str]:
     """Return LLVM's name of the kind of system, of this processor and of its features, without LLVM where it has told
     them before."""
     name = hashlib.blake2b(
-        f"host; llvmlite {version('llvmlite')}; {_processor_text()}".encode(), digest_size=16
+        f"host; llvmlite {llvm_version()}; {_processor_text()}".encode(), digest_size=16
     ).hexdigest()
     kept = _HOSTS.load(name) if _processor_text() else None
     if kept is None:

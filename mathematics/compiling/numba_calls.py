@@ -23,7 +23,8 @@ import numpy as np
 
 from . import store
 from .arguments import ArgumentType, ArrayType, NumberType, RecordType
-from .kernel_expressions import CompileError, Translated
+from .failures import CompileError
+from .kernel_expressions import Translated
 from .llvm_code import leaves
 from .machine_code import linked, object_of, tools
 

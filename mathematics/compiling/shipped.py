@@ -11,15 +11,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import store
 from .arguments import ArgumentType
 from .fingerprint import fingerprint
-from .machine_code import OLDEST, OPTIONS, cross_compiled, process_triple
-from .translate import Translator
+from .machine_code import OLDEST, OPTIONS, cross_compiled, llvm_version, process_triple
 
 if TYPE_CHECKING:
     from zipfile import ZipFile
@@ -71,9 +69,7 @@ def _name(kernel: Callable[..., Any], signature: tuple[ArgumentType, ...], tripl
 @cache
 def _tools(triple: str) -> str:
     compiler = [store.file_digest(str(file)) for file in sorted(FOLDER.glob("*.py"))]
-    return "; ".join(
-        (f"llvmlite {version('llvmlite')}", triple, OLDEST[triple], OPTIONS, *compiler)
-    )
+    return "; ".join((f"llvmlite {llvm_version()}", triple, OLDEST[triple], OPTIONS, *compiler))
 
 
 def write(kernels: Iterable[Kernel], triple: str, folder: Path = FOLDER) -> Path:
@@ -83,6 +79,8 @@ def write(kernels: Iterable[Kernel], triple: str, folder: Path = FOLDER) -> Path
         CompileError: a kernel does what compiled code cannot.
     """
     from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+    from .translate import Translator
 
     translator = Translator()
     made: dict[str, bytes] = {}

@@ -192,7 +192,7 @@ class Slices(Expressions):
         return GreatestLength(more) if more > 0 else 0
 
     def _more_than(self, lower: ast.expr | None, upper: ast.expr) -> int | None:
-        """By how much one bound is above the other, where that is known: 2 of ``k + 1`` and ``k + 3``."""
+        """Find the distance between two bounds, where that is known: 2 of ``k + 1`` and ``k + 3``."""
         first, begin = ("", 0) if lower is None else self._offset(lower)
         last, end = self._offset(upper)
         return end - begin if first == last else None

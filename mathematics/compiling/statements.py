@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from .arguments import ArgumentType, NumberType, RecordType
-from .kernel_expressions import Callee, CompileError, ExpressionTranslator, Translated
+from .failures import CompileError
+from .kernel_expressions import Callee, ExpressionTranslator, Translated
 from .known_functions import apply
 from .llvm_code import FLOAT, INT, NOTHING, NotCompilable, Value, join, leaves, number
 

@@ -11,8 +11,7 @@ from typing import Any
 
 from .arguments import HEADER, ArgumentType, ArrayType
 from .equations import expanded_definition
-from .failures import FAILURES, Site
-from .kernel_expressions import CompileError as CompileError  # noqa: PLC0414  also imported from here
+from .failures import FAILURES, CompileError, Site
 from .kernel_expressions import Translated, origin_of
 from .kernel_registry import is_kernel, written_code
 from .llvm_code import leaves

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array, Array1D, Array2D, Flags1D, Flags2D
 from ...robots.description import RobotDescription
-from ..models.exact_dynamics import ExactDynamics
 
 COLUMNS = (
     "com", "com_velocity", "com_acceleration", "orientation", "angular_velocity", "angular_acceleration",
@@ -210,6 +209,8 @@ def flight_rotation(table: JumpTable, robot: RobotDescription) -> FlightRotation
 
 def _inertia(table: JumpTable, rows: slice, robot: RobotDescription) -> Array:
     """Return the inertia of the whole robot about its pitch axis [kg m^2] in those rows."""
+    from ..models.exact_dynamics import ExactDynamics  # which only somersaults need
+
     dynamics, spin = ExactDynamics(robot), np.zeros(6 + len(robot.joints))
     spin[3 + PITCH] = 1.0
     poses = zip(

@@ -157,11 +157,15 @@ class PlanLibrary:
 
     def path_of(self, task: JumpTask) -> Path | None:
         """Return the file of the plan of exactly this task, or ``None``."""
+        return next(self._files(task.hash(self.robot)), None)
+
+    def _files(self, task_hash: str = "*") -> Iterator[Path]:
+        """Yield the files that may be read, by folders and names: in the user's own they must be this user's only."""
         for folder in self._folders:
-            found = sorted(folder.glob(f"*-{task.hash(self.robot)}.npz"))
-            if found and _may_be_used(found[0]):
-                return found[0]
-        return None
+            own = folder.is_relative_to(user_folder())
+            for path in sorted(folder.glob(f"*-{task_hash}.npz")):
+                if not own or trusted_file(path):
+                    yield path
 
     def attempt(self, task: JumpTask, solve: Solver | None = None) -> PlannedJump:
         """Return a plan of a task, valid or not, with its report, which is made anew.
@@ -186,8 +190,7 @@ class PlanLibrary:
 
     def hashes(self) -> frozenset[str]:
         """Return the hashes of all tasks that have a file, in one look at the folders."""
-        files = (path for folder in self._folders for path in folder.glob("*-*.npz"))
-        return frozenset(path.stem.rpartition("-")[2] for path in files)
+        return frozenset(path.stem.rpartition("-")[2] for path in self._files())
 
     def find(self, task: JumpTask) -> PlannedJump | None:
         """Return the plan of exactly this task, or ``None``.
@@ -294,11 +297,10 @@ class PlanLibrary:
 
     def headers(self) -> Iterator[tuple[Path, dict[str, Any]]]:
         """Yield every file with its header; broken files are left out."""
-        for folder in self._folders:
-            for path in sorted(folder.glob("*-*.npz")):
-                header = _header(path)
-                if header is not None:
-                    yield path, header
+        for path in self._files():
+            header = _header(path)
+            if header is not None:
+                yield path, header
 
     def prune(self, tasks: Iterable[JumpTask]) -> list[Path]:
         """Remove from this library's own folder every plan of a task that is none of these. Plans
@@ -362,11 +364,6 @@ class PlanLibrary:
                 raise
             # a home that is missing or read-only: planned again the next time
         return plan, False
-
-
-def _may_be_used(path: Path) -> bool:
-    """Return whether a plan's file may be read: in the user's own folder it must be this user's only."""
-    return path.parent != user_folder() or trusted_file(path)
 
 
 _headers: dict[Path, tuple[tuple[int, int, int], dict[str, Any] | None]] = {}

@@ -30,6 +30,7 @@ from ..models.euler_angles import (
     rotation,
     times,
     times_transposed,
+    unwrapped,
 )
 from ..models.exact_dynamics import (
     AFTER,
@@ -64,14 +65,15 @@ def reference_table(
     dynamics = dynamics_of(plan.task.equipped(robot))
     states = _states(plan, dynamics, steps or {})
     instants, intervals = states.time, states.knot
-    force = _middle_values(plan, plan.contact_force, instants, intervals)
+    flat = plan.contact_force.reshape(len(plan.time), -1)
+    loads = _middle_values(plan, np.hstack([flat, plan.joint_torque]), instants, intervals)
+    force = loads[:, : flat.shape[1]].reshape(-1, *plan.contact_force.shape[1:])
     columns = _rows(dynamics, states.position, states.velocity, force)
-    columns["joint_torque"] = _middle_values(plan, plan.joint_torque, instants, intervals)
+    columns["joint_torque"] = loads[:, flat.shape[1] :]
     columns["angular_acceleration"], columns["joint_acceleration"] = (
         states.bend[:, :3], states.bend[:, 3:],
     )  # fmt: skip
-    for foot in range(len(robot.feet)):
-        columns["foot_yaw"][:, foot] = np.unwrap(columns["foot_yaw"][:, foot])
+    columns["foot_yaw"] = unwrapped(columns["foot_yaw"])
     _follow_one_sign(columns["orientation"])
     if plan.task.formulation != "full":
         for name in CENTROIDAL:
@@ -207,12 +209,12 @@ def pinocchio_quaternions(pin: Any, turns: Array) -> Array:
 def _middle_values(
     plan: PlannedJump, values: Array, instants: Array, intervals: NDArray[np.int64]
 ) -> Array:
-    """Return the values in the middle of the intervals at instants in those intervals: linear from one middle to the
+    """Return what the intervals' values (n_knots, m) are at instants in those intervals: linear from one middle to the
     next, never across lift-off or touchdown.
     """
     lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
     ends = np.array([knot for flight in flight_knots(plan) for knot in flight])
-    found = np.empty((len(instants), *values.shape[1:]))
+    found = np.empty((len(instants), values.shape[1]))
     number = np.searchsorted(ends, intervals, side="right")
     for k, group in enumerate(np.split(lasting, np.searchsorted(lasting, ends))):
         here = np.flatnonzero(number == k)
@@ -223,8 +225,7 @@ def _middle_values(
         here, after = here[~outside], after[~outside]
         share = (instants[here] - middles[after - 1]) / (middles[after] - middles[after - 1])
         first, second = values[group[after - 1]], values[group[after]]
-        share = share.reshape(-1, *(1,) * (values.ndim - 1))
-        found[here] = first + share * (second - first)
+        found[here] = first + share[:, None] * (second - first)
     return found
 
 

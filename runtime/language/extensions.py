@@ -16,7 +16,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from importlib import import_module, metadata
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -146,6 +146,8 @@ def other_extensions() -> Mapping[str, Extension]:
     Raises:
         ExtensionError: a package cannot be found, or its declaration is missing or wrong.
     """
+    from importlib import metadata  # a twentieth of a start
+
     found = {}
     for point in metadata.entry_points(group=ENTRY_POINTS):
         spec = find_spec(point.value)

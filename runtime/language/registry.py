@@ -21,7 +21,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache, lru_cache
-from importlib import metadata
 from pathlib import Path
 from types import ModuleType
 
@@ -57,6 +56,10 @@ def _own_blocks() -> Mapping[str, Path]:
 
 @lru_cache(maxsize=1)
 def _entry_points() -> Mapping[str, str]:
+    from importlib import (
+        metadata,  # a twentieth of a start, and most graphs have aloft's blocks only
+    )
+
     return {point.name: point.value for point in metadata.entry_points(group=ENTRY_POINTS)}
 
 

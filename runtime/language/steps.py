@@ -35,12 +35,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mathematics.compiling.arguments import record_type
-from ...mathematics.compiling.equations import reports_event
 from ...mathematics.compiling.fingerprint import closure
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.compiling.kernel_registry import (
     arguments_of,
     is_kernel,
+    reports_event,
     written_code,
 )
 from ...mathematics.compiling.kinds import NUMBER, ArrayKind, Kind, RecordKind, kind_of_annotation

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -17,19 +18,23 @@ from ..language.signals import Field
 from ..language.stages import BlockSpec, CheckedGraph
 
 
-class Logged(Protocol):
-    """A run that kept every tick of its signals; see ``RunResult``."""
-
-    @property
-    def graph(self) -> CheckedGraph | None:
-        """The graph that ran."""
+class Timed(Protocol):
+    """A run of which the values of some signals are known at every tick."""
 
     @property
     def time(self) -> NDArray[np.float64]:
         """The time of every tick [s], (ticks,)."""
 
-    def signals(self) -> tuple[str, ...]:
-        """Return the names that ``signal`` knows."""
+    def signals(self) -> Collection[str]:
+        """Return the names of the signals."""
+
+
+class Logged(Timed, Protocol):
+    """A run that kept every tick of its signals; see ``RunResult``."""
+
+    @property
+    def graph(self) -> CheckedGraph | None:
+        """The graph that ran."""
 
     def signal(self, name: str) -> NDArray[Any]:
         """All values of ``block.output.field``, (ticks, ...)."""
@@ -65,61 +70,98 @@ class SignalPlot:
         save_panels(self.panels, self.title, Path(path))
 
 
-def plot_signals(
-    run: Logged, names: Sequence[str], start: float | None, end: float | None
-) -> SignalPlot:
-    """Plot signals of a run that kept a log; see ``RunResult.plot``."""
-    if not names:
-        raise ValueError("name a signal to plot, such as 'block.output' or 'block.output.field'")
+@dataclass(frozen=True)
+class Legend:
+    """Texts of a signal in a plot: its ``unit``, a name for each of its ``elements`` or none, the names of its
+    ``rows`` if they have any, by which they can be selected, and those of its ``values``."""
+
+    unit: str = ""
+    elements: Sequence[str] = ()
+    rows: Sequence[str] = ()
+    values: Mapping[int, str] = field(default_factory=dict)
+
+
+def panels_of(
+    run: Timed,
+    values: Callable[[str], NDArray[Any]],
+    legend: Callable[[str, tuple[int, ...]], Legend],
+    name: str,
+    start: float | None,
+    end: float | None,
+) -> list[Panel]:
+    """Make one panel for every field that ``name`` says, of a result or of a recording.
+
+    Args:
+        run: tells the time of every tick and the names of its signals.
+        values: gives all values of a field, (ticks, ...).
+        legend: gives the legend of a field by its name and shape.
+        name: ``block.port.field``, ``block.port`` for all its fields, or some elements of either.
+        start: from this time [s].
+        end: up to this time [s].
+
+    Raises:
+        KeyError: there is no such signal; the message has the nearest names.
+        ValueError: there is no such element, or nothing was recorded in that time.
+    """
     time = run.time
     kept = np.ones(len(time), bool)
     kept &= time >= start if start is not None else True
     kept &= time <= end if end is not None else True
     if not kept.any():
         raise ValueError(nothing_between(start, end))
+    source, selection = read_selection(name) or (name, Selection())
+    base = f"{source}.{selection.field}" if selection.field else source
+    known = run.signals()
+    found = [base] if base in known else [n for n in known if n.rpartition(".")[0] == base]
     panels = []
-    for name in names:
-        source, selection = read_selection(name) or (name, Selection())
-        base = f"{source}.{selection.field}" if selection.field else source
-        known = run.signals()
-        found = [base] if base in known else [n for n in known if n.rpartition(".")[0] == base]
-        for each in found or [base]:
-            values = run.signal(each)[kept]
-            shape = values.shape[1:]
-            unit, labels, rows, y_names = _declared(run.graph, each, shape)
-            try:
-                places = select(Selection("", selection.indices), shape, rows).reshape(-1)
-            except ValueError as error:
-                raise ValueError(f"{name}: {error}") from error
-            flat = values.reshape(len(values), -1).astype(np.float64)
-            lines = [
-                Curve(labels[k] if shape else "", time[kept], flat[:, k]) for k in places.tolist()
-            ]
-            panels.append(Panel(f"{each} [{unit}]" if unit else each, lines, y_names=y_names))
-    title = run.graph.name if run.graph is not None else ""
-    return SignalPlot(title, tuple(panels))
+    for each in found or [base]:
+        kept_values = values(each)[kept]
+        shape = kept_values.shape[1:]
+        text = legend(each, shape)
+        try:
+            places = select(Selection("", selection.indices), shape, text.rows).reshape(-1)
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from error
+        flat = kept_values.reshape(len(kept_values), -1).astype(np.float64)
+        labels = text.elements or [str(k) for k in range(flat.shape[1])]
+        named = shape not in ((), (1,))  # the only element needs no name
+        lines = [Curve(labels[k] if named else "", time[kept], flat[:, k]) for k in places.tolist()]
+        title = f"{each} [{text.unit}]" if text.unit else each
+        panels.append(Panel(title, lines, y_names=text.values))
+    return panels
 
 
-def _declared(
-    graph: CheckedGraph | None, name: str, shape: tuple[int, ...]
-) -> tuple[str, list[str], tuple[str, ...], dict[int, str]]:
-    """Return the unit of a field, the name of each of its elements, the names of its rows if they
-    have any, and those of its values. Of a result without its graph, as after pickling, only numbers are known."""
+def plot_signals(
+    run: Logged, names: Sequence[str], start: float | None, end: float | None
+) -> SignalPlot:
+    """Plot signals of a run that kept a log; see ``RunResult.plot``."""
+    if not names:
+        raise ValueError("name a signal to plot, such as 'block.output' or 'block.output.field'")
+    graph = run.graph
+    panels = [
+        panel
+        for name in names
+        for panel in panels_of(run, run.signal, partial(_declared, graph), name, start, end)
+    ]
+    return SignalPlot(graph.name if graph is not None else "", tuple(panels))
+
+
+def _declared(graph: CheckedGraph | None, name: str, shape: tuple[int, ...]) -> Legend:
+    """Return the legend of a field. Of a result without its graph, as after pickling, only numbers are known."""
     numbers = [", ".join(map(str, place)) for place in np.ndindex(*shape)]
     path, _, rest = name.partition(".")
     spec = None if graph is None else next((s for s in graph.blocks if s.path == path), None)
-    field = None if spec is None else _field(spec, rest)
-    if graph is None or spec is None or field is None:
-        return "", numbers, (), {}
-    values = {int(value): value.name.lower() for value in field.values or ()}
-    quantity = spec.quantities.get(rest)
-    quantity = quantity or Quantity(field.unit)
-    text = "" if quantity.unit_text == "1" else quantity.unit_text
-    if graph.robot is not None and field.shape == ("n_joints",):
+    declared = None if spec is None else _field(spec, rest)
+    if graph is None or spec is None or declared is None:
+        return Legend("", numbers)
+    values = {int(value): value.name.lower() for value in declared.values or ()}
+    quantity = spec.quantities.get(rest) or Quantity(declared.unit)
+    unit = "" if quantity.unit_text == "1" else quantity.unit_text
+    if graph.robot is not None and declared.shape == ("n_joints",):
         joints = tuple(joint.name for joint in graph.robot.joints)
-        return text, list(joints), joints, values
-    axes = list(AXES) if field.shape == (3,) and field.frame else numbers
-    return text, axes, (), values
+        return Legend(unit, joints, joints, values)
+    axes = AXES if declared.shape == (3,) and declared.frame else numbers
+    return Legend(unit, axes, (), values)
 
 
 def _field(spec: BlockSpec, name: str) -> Field | None:

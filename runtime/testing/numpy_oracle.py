@@ -15,15 +15,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mathematics.compiling.equations import reports_event
 from ...mathematics.compiling.expressions import cross
 from ...mathematics.compiling.fingerprint import numba_functions
-from ...mathematics.compiling.kernel_registry import arguments_of, is_kernel, written_code
+from ...mathematics.compiling.kernel_registry import (
+    arguments_of,
+    is_kernel,
+    reports_event,
+    written_code,
+)
 from ...mathematics.compiling.kinds import ArrayKind, Kind, RecordKind, argument_kinds
 from ...mathematics.compiling.numba_calls import is_numba, names_read
 
 DISTURBANCE = 2.0**-44
-"""By how much numbers are changed, relative to each, to see how far rounding may go."""
+"""The change of numbers, relative to each, that shows how far rounding may go."""
 TRIALS = 4
 
 
@@ -239,7 +243,9 @@ class _Written:
 def _of_elements(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function of numbers that also takes arrays, whose elements it is applied to."""
 
-    def applied(*arguments: Any) -> Any:
+    def applied(*arguments: Any, **named: Any) -> Any:
+        if named or (function in (min, max) and len(arguments) == 1):
+            return function(*arguments, **named)
         if any(isinstance(each, np.ndarray) and each.ndim for each in arguments):
             rows = np.broadcast_arrays(*arguments)
             values = [

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from aloft import __version__
 from aloft.cli.shared import run_machines
 from aloft.logs.file.reader import read
 from aloft.processes.child_process import ChildProcess
@@ -173,26 +174,45 @@ def test_parts_that_are_started_one_by_one_and_their_recordings_merged(here: Pat
     assert "copy.rrd are both of machine 'ground'" in again["reason"]
 
 
+OTHER_VERSION = (
+    "import sys; from aloft.runtime.links import identity; identity.__version__ = '9.9'; "
+    "from aloft.cli import main; main()"
+)
+
+
 @pytest.mark.long
-def test_parts_with_other_code_refuse_each_other_by_name(here: Path) -> None:
-    other = here / "other"
-    other.mkdir()
-    (other / "graph.yaml").write_text(GRAPH)
-    (other / "pieces.py").write_text(BLOCKS.replace("-0.3", "-0.4"))
+@pytest.mark.parametrize(
+    ("other", "what", "named"),
+    [
+        ("code", "code", ("'code of robot, pieces:Robot: ",)),
+        ("graph", "graph", ("'duration: 300 ms' on onboard", "'duration: 301 ms' on ground")),
+        ("version", "graph", (f"'aloft {__version__}' on onboard", "'aloft 9.9' on ground")),
+    ],
+)
+def test_parts_with_other_files_or_versions_refuse_each_other_by_name(
+    other: str, what: str, named: tuple[str, ...], here: Path
+) -> None:
+    ground = here / "other"
+    ground.mkdir()
+    (ground / "graph.yaml").write_text(GRAPH.replace("300", "301") if other == "graph" else GRAPH)
+    changed = BLOCKS.replace("-0.3", "-0.4") if other == "code" else BLOCKS
+    (ground / "pieces.py").write_text(changed)
     ports = [f"--set=machines.{name}=tcp/127.0.0.1:{free_port()}" for name in ("onboard", "ground")]
-    command = [sys.executable, "-m", "aloft", "run", "graph.yaml", *ports, "--json", "--no-record"]
+    words = ["run", "graph.yaml", *ports, "--json", "--no-record", "--machine"]
+    start = ["-c", OTHER_VERSION] if other == "version" else ["-m", "aloft"]
     parts = [
         subprocess.Popen(
-            [*command, "--machine", name], cwd=folder, stdout=subprocess.PIPE,
+            [sys.executable, *begin, *words, name], cwd=folder, stdout=subprocess.PIPE,
             stderr=subprocess.PIPE, text=True,
         )
-        for name, folder in (("ground", other), ("onboard", here))
+        for name, folder, begin in (("ground", ground, start), ("onboard", here, ["-m", "aloft"]))
     ]  # fmt: skip
     for part in parts:
         found = result_of(part)
         assert found["exit_code"] == 3 and found["ticks"] == 0
-        assert "do not fit together: the code is" in found["reason"]
-        assert "'code of robot, pieces:Robot: " in found["reason"]
+        assert f"do not fit together: the {what} is" in found["reason"]
+        for each in named:
+            assert each in found["reason"]
     assert not (here / "enabled.txt").exists() and not (here / "damping.txt").exists()
 
 

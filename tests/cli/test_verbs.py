@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pydantic
 import pytest
 import typer
 
@@ -268,8 +269,10 @@ atexit.register(lambda: print(len(searched), gc.get_freeze_count(), *sys.modules
     assert int(searches) < 10 and int(frozen) > 10_000
     tops = {name.partition(".")[0] for name in modules}
     assert tops & HEAVY == set()
+    # Neither the search through installed packages, nor what compiles kernels.
+    assert {"importlib.metadata", "aloft.mathematics.compiling.translate"} & {*modules} == set()
     ours = [name for name in modules if name.startswith("aloft.")]
-    assert len(ours) < 300
+    assert len(ours) < 250
     assert {name for name in ours if name.startswith("aloft.cli.")} == {
         "aloft.cli.app", "aloft.cli.check", "aloft.cli.shared", "aloft.cli.shared.dataclass_methods",
         "aloft.cli.shared.help_texts", "aloft.cli.shared.options", "aloft.cli.shared.output", "aloft.cli.verbs",
@@ -286,6 +289,16 @@ def test_a_bug_does_not_look_like_a_fall(
     result = call_json("check", "count.yaml", code=3)
     assert result == {"success": False, "reason": "bug: ZeroDivisionError: by zero"}
     assert "Traceback" in call("check", "count.yaml", code=3).stderr
+
+
+def test_pydantic_asks_its_loader_of_plugins_for_nothing_else() -> None:
+    # A command puts a module of its own in place of it, which has ``get_plugins`` only.
+    folder = Path(pydantic.__file__).parent
+    texts = [file.read_text(encoding="utf-8") for file in folder.rglob("*.py")]
+    asked = [
+        line.strip() for text in texts for line in text.splitlines() if "_loader import" in line
+    ]
+    assert asked == ["from ._loader import get_plugins"]
 
 
 def test_a_verb_imports_no_other_verbs_file() -> None:

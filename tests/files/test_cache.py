@@ -1,6 +1,8 @@
 """What is kept: used only as it was written, under its own name, from folders that are this user's only."""
 
 import os
+import re
+import shutil
 import stat
 from pathlib import Path
 
@@ -9,12 +11,16 @@ import pytest
 
 from aloft.files import cache as module
 from aloft.files.cache import Cache, cache_root, make_folders, trusted_file, unsealed
+from aloft.logs.file.code import TRUSTED
+from aloft.mathematics.compiling.kept_expansions import EXPANSIONS
+from aloft.mathematics.compiling.machine_code import _HOSTS
 from aloft.mathematics.compiling.store import CACHE as KERNELS
 from aloft.mathematics.kept_arrays import CACHE as ARRAYS
 from aloft.planner.library.validation_cache import NOTES
 from aloft.planner.solving.kept_functions import FUNCTIONS
 
-KINDS = (KERNELS, ARRAYS, NOTES, FUNCTIONS)
+KINDS = (KERNELS, EXPANSIONS, _HOSTS, ARRAYS, NOTES, FUNCTIONS, TRUSTED)
+each_kind = pytest.mark.parametrize("cache", KINDS, ids=lambda cache: cache.kind)
 DATA = bytes(range(256)) * 3
 
 
@@ -31,7 +37,18 @@ def kept(cache: Cache, name: str = "ab/cd", data: bytes = DATA) -> Path:
     return path
 
 
-@pytest.mark.parametrize("cache", KINDS, ids=lambda cache: cache.kind)
+def test_all_that_is_kept_is_tried() -> None:
+    package = Path(module.__file__).parents[1]
+    found = {
+        kind
+        for path in package.rglob("*.py")
+        if "tests" not in path.relative_to(package).parts
+        for kind in re.findall(r"= Cache\(\"(\w+)\"", path.read_text())
+    }
+    assert found == {cache.kind for cache in KINDS}
+
+
+@each_kind
 def test_no_flipped_bit_and_no_cut_is_used(cache: Cache) -> None:
     path = kept(cache)
     whole = path.read_bytes()
@@ -49,15 +66,17 @@ def test_no_flipped_bit_and_no_cut_is_used(cache: Cache) -> None:
     kept(cache)  # made anew
 
 
-def test_exchanged_files_are_not_used() -> None:
-    first, second = kept(KERNELS, "ab/1", b"one"), kept(KERNELS, "ab/2", b"two")
+@each_kind
+def test_exchanged_files_are_not_used(cache: Cache) -> None:
+    first, second = kept(cache, "ab/1", b"one"), kept(cache, "ab/2", b"two")
     one, two = first.read_bytes(), second.read_bytes()
     first.write_bytes(two)
     second.write_bytes(one)
-    assert KERNELS.load("ab/1") is None and KERNELS.load("ab/2") is None
-    other = kept(FUNCTIONS, "ab/1", b"one")
-    other.write_bytes(one)
-    assert FUNCTIONS.load("ab/1") is None, "nor one of another kind"
+    assert cache.load("ab/1") is None and cache.load("ab/2") is None
+    for other in KINDS:
+        if other is not cache:
+            kept(other, "ab/1", b"one").write_bytes(one)
+            assert other.load("ab/1") is None, "nor one of another kind"
 
 
 def test_the_digest_of_nothing_is_not_nothing() -> None:
@@ -102,19 +121,20 @@ def test_folders_that_were_open_are_closed_and_files_that_were_are_replaced() ->
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
 
 
+@each_kind
 @pytest.mark.parametrize("what", ["root", "file"])
 def test_what_another_user_laid_there_is_not_used(
-    what: str, monkeypatch: pytest.MonkeyPatch
+    cache: Cache, what: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = kept(KERNELS)
+    path = kept(cache)
     other = os.geteuid() + 1
     if os.geteuid() == 0:
         os.chown(path if what == "file" else path.parents[2], other, -1)
     else:  # no right to give it away: be another one
         monkeypatch.setattr(module, "_user", lambda: other)
-    assert KERNELS.load("ab/cd") is None and not trusted_file(path)
+    assert cache.load("ab/cd") is None and not trusted_file(path)
     if what == "root":
-        assert not KERNELS.save("ab/cd", DATA), "nor is anything laid into another user's folder"
+        assert not cache.save("ab/cd", DATA), "nor is anything laid into another user's folder"
 
 
 def test_a_link_is_not_followed(tmp_path: Path) -> None:
@@ -135,6 +155,27 @@ def test_a_write_that_fails_leaves_what_was_there(monkeypatch: pytest.MonkeyPatc
     assert not KERNELS.save("ab/cd", b"new")
     assert KERNELS.load("ab/cd") == DATA
     assert list(path.parent.iterdir()) == [path], "and nothing else"
+
+
+@each_kind
+@pytest.mark.parametrize("call", ["fsync", "replace"])
+def test_a_writer_that_is_killed_leaves_what_was_there(
+    call: str, cache: Cache, home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept(cache)
+    then, real = home.with_name("then"), getattr(os, call)
+
+    def killed(*arguments: object) -> None:
+        shutil.copytree(home, then)  # what is on the disk at this instant
+        real(*arguments)
+
+    monkeypatch.setattr(os, call, killed)
+    assert cache.save("ab/cd", b"new")
+    monkeypatch.setattr(os, call, real)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(then))
+    assert len([path for path in then.rglob("*") if path.is_file()]) == 2
+    assert cache.load("ab/cd") == DATA
+    kept(cache, data=b"new")
 
 
 def test_it_is_on_the_disk_before_it_has_its_name(monkeypatch: pytest.MonkeyPatch) -> None:

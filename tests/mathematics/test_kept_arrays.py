@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
@@ -158,6 +159,6 @@ def test_other_folders_and_files_do_not(package: Path) -> None:
 
 def test_the_versions_of_libraries_are_part_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
     before = digest("mathematics")
-    monkeypatch.setattr(module.metadata, "version", lambda name: "0.0")
+    monkeypatch.setattr(metadata, "version", lambda name: "0.0")
     assert digest("mathematics") != before
     code_digest.cache_clear()

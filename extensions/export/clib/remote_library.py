@@ -24,8 +24,9 @@ _HEAD = np.dtype(
     ]
 )  # fmt: skip
 """The struct ``shared`` of ``real_time.c``."""
-PATIENCE = 1.0
+PATIENCE = 5.0
 """Seconds within which the process has to answer."""
+_SLICE = 0.2
 
 
 class RemoteSharedLibrary:
@@ -82,6 +83,7 @@ class RemoteSharedLibrary:
         self._status = self._head["status"]
         libc: Any = ctypes.CDLL(None, use_errno=True)
         self._post, self._wait = libc.sem_post, libc.sem_timedwait
+        self._wait.argtypes = ctypes.c_void_p, ctypes.c_void_p
         self._ready, self._done = (
             ctypes.c_void_p(self._head[key].ctypes.data)
             for key in ("inputs_ready", "outputs_ready")
@@ -95,10 +97,13 @@ class RemoteSharedLibrary:
         """
         if self._lockstep:
             self._post(self._ready)
-            end = time.time() + PATIENCE
-            until = (ctypes.c_int64 * 2)(int(end), int(end % 1.0 * 1e9))
-            if self._wait(self._done, until):
-                self._fail()
+            end = time.monotonic() + PATIENCE
+            # the semaphore knows only the wall clock, which may be set, so it waits in short slices
+            until = time.time() + _SLICE
+            while self._wait(self._done, (ctypes.c_int64 * 2)(int(until), int(until % 1.0 * 1e9))):
+                if time.monotonic() > end:
+                    self._fail()
+                until = time.time() + _SLICE
             return int(self._status[0])
         (own_given, given), (own_found, found) = self._pairs
         self._given += 1

@@ -5,8 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 from ....planner.checking.validity import checked
+from ....planner.problem.assembly import Assembly
 from ....planner.problem.problem import FullProblem
 from ....planner.problem.unpacking import can_start, pack, unpack
 from ....planner.task.plan import PlannedJump
@@ -51,6 +53,8 @@ class HopPlanner:
         self._level, self._steps = samples, steps
         self._problems = HopProblems(robot)
         self._correctors: dict[object, Corrector] = {}
+        # Kinds of hops share a corrector; to find that out takes long, so it is done once for each.
+        self._of_kind: WeakKeyDictionary[Assembly, Corrector] = WeakKeyDictionary()
 
     def prepare(self) -> None:
         """Load compiled functions and make the correctors, so that no later plan has to wait for them."""
@@ -128,7 +132,10 @@ class HopPlanner:
         yield samples.plan(samples.nearest(wanted))
 
     def _corrector(self, problem: FullProblem) -> Corrector:
-        key = problem.assembly.signature
-        if key not in self._correctors:
-            self._correctors[key] = Corrector(problem)
-        return self._correctors[key]
+        assembly = problem.assembly
+        if assembly not in self._of_kind:
+            key = assembly.signature
+            if key not in self._correctors:
+                self._correctors[key] = Corrector(problem)
+            self._of_kind[assembly] = self._correctors[key]
+        return self._of_kind[assembly]

@@ -154,3 +154,15 @@ def test_a_file_without_an_index_is_whole(header: Header, tmp_path: Path) -> Non
     indexed.close()
     assert read(tmp_path / "a.rrd").whole and read(tmp_path / "b.rrd").whole
     assert (tmp_path / "a.rrd").stat().st_size < (tmp_path / "b.rrd").stat().st_size - 10_000
+
+
+def test_a_file_that_names_no_version_says_the_last_that_wrote_such_files(tmp_path: Path) -> None:
+    import rerun as rr
+
+    stream = rr.RecordingStream("aloft", send_properties=False)
+    stream.save(tmp_path / "old.rrd")
+    header = json.dumps({"format": 5, "versions": {"python": "3.11.7"}})
+    stream.send_property("aloft", rr.AnyValues(header=header))
+    stream.disconnect()
+    with pytest.raises(RecordingError, match=r"format 5, .*; read it with aloft 0\.2\.0 as it was"):
+        read(tmp_path / "old.rrd")

@@ -42,6 +42,12 @@ def rewritten(whole: Path, to: Path, *arguments: str) -> Path:
 
 
 @pytest.mark.long
+def test_rerun_finds_nothing_wrong(whole: Path) -> None:
+    command = [sys.executable, "-m", "rerun_cli", "rrd", "verify", str(whole)]
+    subprocess.run(command, check=True, capture_output=True, timeout=60)
+
+
+@pytest.mark.long
 @pytest.mark.parametrize(
     "how",
     [

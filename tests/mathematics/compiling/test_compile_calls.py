@@ -14,6 +14,7 @@ from aloft.mathematics.compiling import store
 from aloft.mathematics.compiling.arguments import pack
 from aloft.mathematics.compiling.compile_calls import compile_calls
 from aloft.mathematics.compiling.kernel_call import KernelCall, collect_calls
+from aloft.mathematics.compiling.translate import Translator
 
 HERE = Path(__file__).parent
 spec = importlib.util.spec_from_file_location("kernels_for_tests", HERE / "kernels_for_tests.py")
@@ -50,7 +51,7 @@ def test_machine_code_computes_the_same_bits(order):
 
 
 def test_threads_that_compile_at_the_same_time_wait_for_each_other(monkeypatch):
-    inside, most, translate = [], [], module.Translator.module
+    inside, most, translate = [], [], Translator.module
 
     def watched(translator, kernel, signature):
         inside.append(kernel)
@@ -59,7 +60,7 @@ def test_threads_that_compile_at_the_same_time_wait_for_each_other(monkeypatch):
         inside.remove(kernel)
         return code
 
-    monkeypatch.setattr(module.Translator, "module", watched)
+    monkeypatch.setattr(Translator, "module", watched)
     calls = [KernelCall(ours.mix, *arguments(order)) for order in ("C", "F", "A", "C")]
     said: list[str] = []
     threads = [
@@ -83,7 +84,7 @@ def test_the_second_process_finds_the_machine_code_in_the_cache(monkeypatch):
     files = list(store.cache_folder().rglob("*.o"))
     assert len(files) == 1
     monkeypatch.setattr(module, "_loaded", {})
-    monkeypatch.setattr(module, "Translator", None)  # would fail if something were compiled
+    monkeypatch.setattr(Translator, "module", None)  # would fail if something were compiled
     call = KernelCall(ours.mix, *arguments("C"))
     assert compile_calls([call]) == "" and call.compiled is not None
 

@@ -9,7 +9,7 @@ from itertools import count
 import numpy as np
 import pytest
 
-from aloft.mathematics.compiling import kept_expansions
+from aloft.mathematics.compiling import equations
 from aloft.mathematics.compiling.equations import expanded_code
 from aloft.mathematics.compiling.expressions import NUMBERS
 from aloft.mathematics.compiling.kept_expansions import EXPANSIONS, kept_expansion
@@ -55,7 +55,7 @@ def test_what_is_kept_is_what_is_made(monkeypatch):
     code = written_code(skew)
     made = kept_expansion(skew, code)
     assert len(kept()) == 1
-    monkeypatch.setattr(kept_expansions, "expanded_code", lambda *_: pytest.fail("made twice"))
+    monkeypatch.setattr(equations, "expanded_code", lambda *_: pytest.fail("made twice"))
     again = kept_expansion(skew, code)
     assert again == made == expanded_code(skew, code)
     assert (again.co_linetable, again.co_filename) == (made.co_linetable, code.co_filename)
@@ -92,4 +92,4 @@ def test_what_is_kept_runs_in_a_module_that_nothing_was_rewritten_in(tmp_path, m
         module.scaled(np.array([-3.0, 2.0]), out)
         assert out.tolist() == [-1.0, 1.0]
         assert NUMBERS in vars(module), "a function of it stands for NumPy's"
-        monkeypatch.setattr(kept_expansions, "expanded_code", lambda *_: pytest.fail("made twice"))
+        monkeypatch.setattr(equations, "expanded_code", lambda *_: pytest.fail("made twice"))

@@ -272,6 +272,18 @@ def test_the_mean_of_nothing_is_a_division_by_zero() -> None:
             run()
 
 
+def test_what_is_written_out_is_numpys() -> None:
+    random = np.random.default_rng(2)
+    u, A = random.normal(size=3), random.normal(size=(3, 3))
+    three(written_out, u, A, np.zeros(4, np.int64), np.zeros(3), np.ones((3, 3)))
+
+
+def test_arrays_carried_from_round_to_round_are_numpys() -> None:
+    random = np.random.default_rng(1)
+    u, A = random.normal(size=3), random.normal(size=(3, 3))
+    three(carried, u, A, np.zeros(3), np.zeros((3, 3)))
+
+
 def test_a_slice_that_numpy_would_repeat_ends_the_run() -> None:
     untouched(repeated_by_numpy)(np.arange(6.0), 5, np.ones(3))
     with pytest.raises(IndexError, match=r"a slice of . elements stands where . are"):
@@ -298,6 +310,54 @@ def made_in_a_loop(u: Vector3, y: Vector3) -> None:
         t = u * i
         y[:] = last
         last = t
+
+
+@kernel
+def carried(u: Vector3, A: Matrix3, y: Vector3, M: Matrix3) -> None:
+    """Arrays that each round makes anew of those of the round before."""
+    T, x, a, b, k = np.eye(3), u, u + 0.0, 0.5 * u, 0
+    for i in range(3):
+        T = T @ A
+        if u[i] > -0.5:
+            x = A @ x - x[::-1] + u
+        a, b = b + u, a - x
+    while k < 3:
+        x = np.outer(x, u)[1] + np.array([x[1], x[0], x[2]])
+        k += 1
+    y[:] = x + a - 2.0 * b
+    M[:] = T
+
+
+@kernel
+def written_out(u: Vector3, A: Matrix3, n: Indices1D, y: Vector3, M: Matrix3) -> None:
+    """Lists of numbers, elements by names, rows and columns in one number each, constants of modules."""
+    a, b, c = u - 1.0
+    M[0] = [a, 2, u[0]]
+    M[:, 1] = (1.0, b, M[0, 0])
+    M[2] += [c, 0.0, 1]
+    y[:] = np.linalg.norm(A, axis=1) + np.sum(A * 2.0 - M, axis=0)
+    y += np.mod(u, 2 * np.pi) - np.clip(A.max(axis=-1), -math.pi, np.pi / 2)
+    y -= np.round(4.0 * u) + np.deg2rad(u)
+    n[:3] = np.argmin(A, axis=0)
+
+
+@kernel
+def seen_later(u: Vector3, y: Vector3) -> None:
+    x = u + 0.0
+    for _ in range(3):
+        last = x
+        x = x + u
+        y += last
+
+
+@kernel
+def part_kept(u: Vector3, A: Matrix3, y: Vector3) -> None:
+    row = u
+    for i in range(3):
+        T = A * i
+        if i > 0:
+            y += row
+        row = T[0]
 
 
 @kernel
@@ -337,8 +397,35 @@ def turned(A: Matrix3) -> None:
 
 
 @kernel
+def rows_by_a_list(A: Matrix3) -> None:
+    A[[0, 2]] = A[[2, 0]]
+
+
+@kernel
+def new_axis(u: Vector3, A: Matrix3) -> None:
+    A[:] = u[:, None] * u
+
+
+@kernel
 def changing_step(a: Array1D, k: int) -> None:
     a[::k] = 0.0
+
+
+@kernel
+def rolled(u: Vector3, y: Vector3, M: Matrix3) -> None:
+    t = np.roll(u, 1)
+    y[:] = 2.0 * t
+    y += np.roll(u, 2)
+    M[0] = np.roll(u, 1)
+
+
+def test_what_kernels_do_not_know_is_numpys_in_plain_python_and_named() -> None:
+    u, plain, expected = np.arange(3.0), [np.zeros(3), np.zeros((3, 3))], [np.zeros(3), np.zeros((3, 3))]  # fmt: skip
+    rolled(u, *plain)
+    untouched(rolled)(u, *expected)
+    assert all(map(np.array_equal, plain, expected))
+    reason = compile_calls([KernelCall(rolled, u, *plain)])
+    assert "np.roll is no kernel, and nothing that kernels may call; put it into an @numba.njit function" in reason  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -352,12 +439,22 @@ def changing_step(a: Array1D, k: int) -> None:
             made_in_a_loop,
             "last would keep an array that the loop makes anew; make both before the loop",
         ),
+        (
+            seen_later,
+            "last would keep an array that the loop makes anew; make both before the loop",
+        ),
+        (part_kept, "row would keep an array that the loop makes anew; make both before the loop"),
         (unknown_argument, "gained has no argument 'factor'; it has x, gain, offset"),
         (of_unknown_size, "this makes a new array: assign it into one, as in scratch.x[:] = ..."),
         (
             selected,
             "a mask selects elements in y[mask] = ...; for others write a loop, or np.where",
         ),
+        (
+            rows_by_a_list,
+            "A[[0, 2]]: an index is a number; take one row, or element, after the other",
+        ),
+        (new_axis, "u[:, None]: None adds a dimension; write np.outer, or a loop"),
         (changing_step, "the step of a[::k] is not a constant"),
     ],
 )

@@ -126,7 +126,7 @@ def test_another_llvm_another_compiler_and_a_named_processor_compile(
     module = package()
     write(module, tmp_path)
     with monkeypatch.context() as patch:
-        patch.setattr(shipped, "version", lambda _: "0.1")
+        patch.setattr(shipped, "llvm_version", lambda: "0.1")
         forget()
         assert compiled(call_of(module), patch) == 1
     (tmp_path / "another_compiler.py").write_text("# another file of the compiler\n")

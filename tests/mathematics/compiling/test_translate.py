@@ -14,8 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aloft.mathematics.compiling.arguments import pack, type_of
+from aloft.mathematics.compiling.failures import CompileError
 from aloft.mathematics.compiling.machine_code import MachineCode
-from aloft.mathematics.compiling.translate import CompileError, Translator
+from aloft.mathematics.compiling.translate import Translator
 from aloft.mathematics.kernel import kernel
 
 from .kernels_for_tests import total_of_positive
@@ -277,7 +278,7 @@ def has_list(out: Array) -> None:
         (returns_array, (np.zeros(2),), "a kernel returns numbers, or a tuple of numbers", 1),
         (indexes, (1.0, np.zeros(2)), "an index is a whole number; write int(...)", 1),
         (goes_over, (np.zeros(2), np.zeros(2)), "a loop goes over range(...)", 1),
-        (names_argument, (np.zeros(2),), "a kernel passes arguments by position", 1),
+        (names_argument, (np.zeros(2),), "a kernel passes arguments by position; write a loop", 1),
         (has_list, (np.zeros(2),), "compiled kernels have no list", 1),
         (divides, (1.0,), "this takes an array, not a number (float)", 1),
         (divides, (), "takes 1 arguments, and gets 0", 0),

@@ -220,3 +220,26 @@ def test_the_folders_given_come_first(tmp_path):
 def test_a_task_that_is_nowhere_is_refused(tmp_path):
     with pytest.raises(LookupError, match=r"no task 'mine.yaml' beside the graph or among the sh"):
         find_task("mine.yaml", tmp_path)
+
+
+@pytest.mark.parametrize("place", ["file", "folder"])
+def test_a_plan_that_others_may_write_is_not_even_begun_from(
+    place: str, good: PlannedJump, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    library = PlanLibrary(ROBOT)
+    path = library.add(replace(good, task=near()))
+    task = near()
+
+    def known() -> tuple[bool, ...]:
+        nearest = library.nearest(task)
+        assert nearest is not None
+        return (
+            library.find(task) is not None, nearest[0].task.name == "near",
+            task.hash(ROBOT) in library.hashes(), path in [found for found, _ in library.tasks()],
+        )  # fmt: skip
+
+    assert known() == (True, True, True, True)
+    changed = path if place == "file" else path.parent
+    changed.chmod(changed.stat().st_mode | 0o022)
+    assert known() == (False, False, False, False)

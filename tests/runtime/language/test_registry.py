@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterator
+from importlib import metadata
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -211,7 +212,7 @@ def test_what_is_not_there(name: str) -> None:
 
 def test_blocks_of_other_packages(monkeypatch: pytest.MonkeyPatch) -> None:
     point = EntryPoint("theirs.Gain", "aloft.blocks.general.arithmetic:Gain", "aloft.blocks")
-    monkeypatch.setattr(registry.metadata, "entry_points", lambda group: [point])
+    monkeypatch.setattr(metadata, "entry_points", lambda group: [point])
     registry._entry_points.cache_clear()
     try:
         assert find_block("theirs.Gain") is Gain

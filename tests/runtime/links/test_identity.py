@@ -4,7 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from aloft import __version__
 from aloft.runtime.language import code_digest
+from aloft.runtime.links import identity as module
 from aloft.runtime.links.identity import Identity
 from aloft.runtime.loading import checked_text
 from aloft.runtime.placement.placed import split_over_machines
@@ -34,6 +36,16 @@ def test_another_parameter_is_another_graph_of_the_same_schema() -> None:
     assert text == (
         f"the graph is {here.graph_hash} on a and {there.graph_hash} on b; the first difference "
         "is 'with: {gain: 2.0, n: 2}' on a, 'with: {gain: 3.0, n: 2}' on b"
+    )
+
+
+def test_another_version_is_another_graph(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = identity(TEXT)
+    monkeypatch.setattr(module, "__version__", "9.9")
+    there = identity(TEXT)
+    assert here.difference(there, "a", "b") == (
+        f"the graph is {here.graph_hash} on a and {there.graph_hash} on b; the first difference "
+        f"is 'aloft {__version__}' on a, 'aloft 9.9' on b"
     )
 
 

@@ -14,6 +14,7 @@ import pytest
 
 import aloft
 from aloft.extensions.export.blocks.library import CLibrary
+from aloft.extensions.export.clib import remote_library
 from aloft.extensions.export.clib.write import write_library
 from aloft.files.problems import LoadError
 from aloft.logs.recording.recorder import Recorder
@@ -302,6 +303,21 @@ def test_a_process_in_lockstep_gives_the_same_bytes(folder: Path, tmp_path: Path
     assert not memory.exists()
     with pytest.raises(AloftError, match="start the program main of the library first"):
         aloft.load(text, path=folder / "g.yaml").run()
+
+
+@needs_compiler
+@pytest.mark.parametrize("shift", [-86400.0, 86400.0])
+def test_a_wall_clock_that_is_set_ends_no_wait_for_a_process(
+    shift: float, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    memory = tmp_path / "memory"
+    text = with_library("controller", more=f", memory: {memory}")
+    read = time.time
+    monkeypatch.setattr(remote_library.time, "time", lambda: read() + shift)
+    with process(folder / "controller", memory, "--lockstep"):
+        result = aloft.load(text, path=folder / "g.yaml").run()
+        result.raise_if_failed()
+        assert result.ticks == 200
 
 
 @needs_compiler
