@@ -77,7 +77,9 @@ class PackedGroup:
                 f"expected number is {MOST_TICKS} in each at most"
             )
         found = [self.ticks_of(piece) for piece in self._pieces]
-        return np.unique(np.concatenate([np.zeros(0, np.int64), *found]))
+        ticks = np.concatenate([np.zeros(0, np.int64), *found])
+        in_order = bool((ticks[1:] > ticks[:-1]).all())
+        return ticks if in_order else np.unique(ticks)
 
     def between(self, first: int, last: int) -> Iterator[Record]:
         """Yield the pieces with ticks from ``first`` up to, without, ``last``."""

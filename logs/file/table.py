@@ -3,21 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any, NoReturn, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .format import RecordedField
 
-if TYPE_CHECKING:
-    from .reader import RecordedRun
-
 TICK, TIME = "tick", "t"
 """The first two columns; the second is in seconds."""
 
 
-def flat_columns(run: RecordedRun, names: Sequence[str] = ()) -> dict[str, NDArray[Any]]:
+class SignalSource(Protocol):
+    """The part of a read recording that tables need."""
+
+    @property
+    def ticks(self) -> NDArray[np.int64]:
+        """The recorded ticks, (ticks,)."""
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Their times [s], (ticks,)."""
+
+    @property
+    def rows(self) -> NDArray[np.uint8]:
+        """All signals' bytes at every tick, (ticks, bytes)."""
+
+    def signals(self) -> Mapping[str, RecordedField]:
+        """Return the recorded signals by name."""
+
+    def nearest(self, name: str) -> NoReturn:
+        """Raise the ``KeyError`` that names the signals nearest to a wrong name."""
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        """Return one signal at every tick, (ticks, ...)."""
+
+
+def flat_columns(run: SignalSource, names: Sequence[str] = ()) -> dict[str, NDArray[Any]]:
     """Return ``tick``, ``t`` and every number of some signals, by default of all, each (ticks,).
 
     Args:
@@ -38,7 +60,7 @@ def flat_columns(run: RecordedRun, names: Sequence[str] = ()) -> dict[str, NDArr
     return columns
 
 
-def chosen(run: RecordedRun, names: Sequence[str]) -> list[RecordedField]:
+def chosen(run: SignalSource, names: Sequence[str]) -> list[RecordedField]:
     """Return the signals that ``names`` mean, in the order of the file; all of them without names.
 
     Raises:
@@ -62,7 +84,7 @@ def column_name(field: RecordedField, place: Sequence[int]) -> str:
     return f"{field.name}[{', '.join(map(str, place))}]" if len(place) else field.name
 
 
-def units(run: RecordedRun, names: Sequence[str] = ()) -> Mapping[str, str]:
+def units(run: SignalSource, names: Sequence[str] = ()) -> Mapping[str, str]:
     """Return the unit of every column that has one, as text."""
     found = {TIME: "s"}
     for field in chosen(run, names):

@@ -82,7 +82,7 @@ def body_heights(
     ends = {robot.feet[ball.foot].link: ball for ball in ball_feet(robot) if ball.radius}
     uneven = task.leans or any(hop.landing_height or hop.gap for hop in task.hops())
     shares = np.linspace(0.0, 1.0, BALLS if uneven else 2)[:, None, None]
-    aside = np.linspace(-0.95, 0.95, 7)[:, None, None] if uneven else np.zeros((1, 1, 1))
+    aside = np.linspace(-0.95, 0.95, 7)[:, None, None]
     found = {}
     for link in robot.links:
         ball = ends.get(link.name)
@@ -102,6 +102,9 @@ def body_heights(
                 centres = centres[apart > ball.radius + radius]
                 if not len(centres):
                     continue
+            if not uneven:
+                heights.append((centres[:, :, 2] - radius).min(axis=0))
+                continue
             x = centres[:, :, 0] + radius * aside
             below = centres[:, :, 2] - radius * np.sqrt(1.0 - aside**2)
             ground = ground_height(task, x, progress, centres[:, :, 1])

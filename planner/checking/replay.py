@@ -17,7 +17,7 @@ from ...mathematics.arrays import Array
 from ...mathematics.rotations import matrices_of_quaternions
 from ...mathematics.whole_body_motion import MotionTerms
 from ...robots.description import RobotDescription
-from ..models.euler_angles import coordinates_of, pose_of, twist_of
+from ..models.euler_angles import coordinates_of, pose_of, twist_of, unwrapped
 from ..models.exact_dynamics import (
     ExactDynamics,
     Segment,
@@ -125,7 +125,7 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
         samples, defect, gap, wrench, errors,
         terms.com[knots], terms.com_velocity[knots], terms.momentum[knots],
         terms.points[knots, contacts:],
-        np.unwrap(np.arctan2(ahead[:, :, 1], ahead[:, :, 0]), axis=0),
+        unwrapped(np.arctan2(ahead[:, :, 1], ahead[:, :, 0])),
         flights, impacts,
     )  # fmt: skip
 

@@ -30,6 +30,7 @@ from ..models.euler_angles import (
     rotation,
     times,
     times_transposed,
+    unwrapped,
 )
 from ..models.exact_dynamics import (
     AFTER,
@@ -72,7 +73,7 @@ def reference_table(
     columns["angular_acceleration"], columns["joint_acceleration"] = (
         states.bend[:, :3], states.bend[:, 3:],
     )  # fmt: skip
-    columns["foot_yaw"] = np.unwrap(columns["foot_yaw"], axis=0)
+    columns["foot_yaw"] = unwrapped(columns["foot_yaw"])
     _follow_one_sign(columns["orientation"])
     if plan.task.formulation != "full":
         for name in CENTROIDAL:

@@ -27,8 +27,19 @@ def angles_of(rotation: Array) -> Array:
 def euler_angles(quaternions: Array) -> Array:
     """Return the angles [rad] of a motion's quaternions, both (n, ...), followed through full turns."""
     angles = angles_of(matrices_of_quaternions(quaternions))
-    angles[:, 1:] = np.unwrap(angles[:, 1:], axis=0)
+    angles[:, 1:] = unwrapped(angles[:, 1:])
     return angles
+
+
+def unwrapped(angles: Array) -> Array:
+    """Return angles [rad] (n, ...) followed through full turns: what ``np.unwrap`` does along the first axis, at once
+    where there are none.
+    """
+    if not (np.abs(angles[1:] - angles[:-1]) < np.pi).all():
+        return np.unwrap(angles, axis=0)
+    found = angles.copy()
+    found[1:] += 0.0  # as there, minus zero becomes zero
+    return found
 
 
 def euler_rates(angles: Array, angular_velocity: Array) -> Array:

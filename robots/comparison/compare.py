@@ -31,7 +31,7 @@ def compare_with_file(model: RawModel, built: LinkTree) -> list[Differences]:
          "friction", "damping"), 1.0,
     )  # fmt: skip
     robot = RobotDescription.model_validate({
-        "name": model.name, "base": built.base, "base_joint": built.base_joint,
+        "name": "compared", "base": built.base, "base_joint": built.base_joint,
         "links": [{**link, "shapes": []} for link in built.links], "joints": built.joints,
         "transmission": {
             "motors": joints,

@@ -64,6 +64,12 @@ VARIANTS: dict[str, dict[str, Any]] = {
         "rise": 0.2,
         "rotation": 2.0 * math.pi,
     },
+    "a somersault in place, 25 cm up, on its toes, five times the weight of speeds": {
+        "weights": {**WEIGHTS, "joint_velocity": 5.0},
+        "phases": ON_TOES,
+        "rise": 0.25,
+        "rotation": 2.0 * math.pi,
+    },
 }
 """A jump of 12 cm in place, unless the name says another; every one changes what its name says."""
 PARTS = ("squat and thrust", "flight", "landing")

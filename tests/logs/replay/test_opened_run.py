@@ -11,11 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aloft.logs.file import packed_rows
 from aloft.logs.file.code import code_of, remember
 from aloft.logs.file.header import machine, make_header
+from aloft.logs.recording.recorder import Recorder
 from aloft.logs.recording.writer import RecordingWriter
 from aloft.logs.replay.opened_run import OpenedRun
 from aloft.logs.replay.replay import Keyframes, replay
+from aloft.runtime.graph import load
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.loading import checked_file
 from aloft.runtime.loading.checking.parameters import adjust
@@ -173,3 +176,24 @@ def test_another_kernel_of_blas_is_named(made: tuple[Path, RunResult]) -> None:
     ).stdout
     ours = machine()["blas kernel"]
     assert said.splitlines() == [f"blas kernel was {ours} and is Nehalem"]
+
+
+def test_only_the_rows_from_the_keyframe_on_are_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The last minute of a long run costs what a minute costs."""
+    path = tmp_path / "long.rrd"
+    text = "rate: 100 Hz\nduration: 40 s\nblocks:\n  w: {use: blocks.SineWave, with: {n: 2}}\n"
+    assert load(text).run(sinks=[Recorder(path)], log=False).success
+    unpacked: list[int] = []
+    unpack = packed_rows.unpack
+
+    def counted(data: bytes) -> Any:
+        first, rows = unpack(data)
+        unpacked.append(len(rows))
+        return first, rows
+
+    monkeypatch.setattr(packed_rows, "unpack", counted)
+    done = replay(OpenedRun.of(path), first_tick=3700)
+    assert done.identical
+    assert sum(unpacked) < 300 + 2 * 512

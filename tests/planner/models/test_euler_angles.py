@@ -7,6 +7,7 @@ from aloft.planner.models.euler_angles import (
     euler_angles,
     euler_rates,
     rotation,
+    unwrapped,
 )
 
 
@@ -35,3 +36,13 @@ def test_angles_follow_a_somersault() -> None:
     found = euler_angles(quaternions)
     np.testing.assert_allclose(found[:, 1], pitch, atol=1e-12)
     np.testing.assert_allclose(found[:, [0, 2]], 0.0, atol=1e-12)
+
+
+def test_unwrapped_angles_have_the_bits_of_numpys() -> None:
+    rng = np.random.default_rng(5)
+    still, turning = np.cumsum(rng.uniform(-3.1, 3.1, (2, 40, 2)), axis=1)
+    still[:, 1] = -0.0
+    for angles in (0.1 * still, np.mod(turning, 2 * np.pi), np.full((3, 2), np.nan), still[:1]):
+        found = unwrapped(angles)
+        assert found.tobytes() == np.unwrap(angles, axis=0).tobytes()
+        assert not np.shares_memory(found, angles)

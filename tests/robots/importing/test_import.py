@@ -260,3 +260,13 @@ def test_a_robot_that_stands_in_no_pose_found_is_written_and_read(tmp_path: Path
     target.write_text(new_yaml(arm, target)[0])
     assert "# NOT FOUND: a pose in which it stands." in target.read_text()
     assert len(read(target).description.feet) == 1
+
+
+def test_a_name_that_climbs_stays_in_the_file(tmp_path: Path) -> None:
+    """A URDF may call its robot by a path; what is made of it is called as its own file."""
+    urdf, target = tmp_path / "arm.urdf", tmp_path / "new.yaml"
+    urdf.write_text(ARM.replace('<robot name="arm"', '<robot name="../../arm"'))
+    assert "../../arm" in urdf.read_text()
+    target.write_text(new_yaml(urdf, target).text)
+    assert read(target).description.name == "new"
+    assert {path.name for path in tmp_path.iterdir()} == {"arm.urdf", "new.yaml"}
