@@ -7,7 +7,7 @@ and other numbers as near as ``rounding_bounds`` allows.
 
 ::
 
-    python -m aloft.lab.judge_kernels 20000   # 25 minutes of processor time; --numba 50 asks Numba for every 50th
+    python -m aloft.lab.judge_kernels 20000   # an hour of processor time; --numba 50 asks Numba for every 50th
 """
 
 from __future__ import annotations

@@ -252,7 +252,7 @@ def start(
     )  # fmt: skip
     count = count_standing(points.active)
     rate = max(largest_of(estimate.angular_velocity), largest_of(scratch.joint_rates))
-    stands = count == points.active.shape[0] or count == 0 or rate < STARTING_RATE
+    stands = count == 0 or rate < STARTING_RATE
     standing[:] = True
     if not stands:
         standing[:] = points.active

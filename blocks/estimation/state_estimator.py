@@ -45,8 +45,9 @@ _LINE_NOISE = 6e-8
 """Squared uncertainty of a line's slope times its duration cubed [rad^2 s]: 0.5 mrad of white noise in 20 ms."""
 _GROUND_TIME = 1.0
 """Time constant of the correction by the ground [s] after a step, when feet may roll."""
-_FIRST_TILT_TIME = 0.2
-"""Time constant of the tilt correction by velocity [s] at a start in a step, when the tilt is hardly known."""
+_SETTLING = 0.3
+"""Time [s] in which the velocity settles after a start in a step: it is from one sample, whose error is not the tilt's. From
+then on the time constant of the tilt correction by velocity is the time since the start, as the tilt is hardly known."""
 _UNREST_TIME = 0.3
 _FIRST_UNREST = 0.1
 _LARGEST_UNREST = 0.3
@@ -146,7 +147,7 @@ class StateEstimator(InertialEstimator):
     also does not notice a push.
 
     It starts at the first sample, or in a gantry when the first point touches the ground, with the robot standing on level ground, or ground of that ``slope``; or in a step,
-    if points are without contact and a rate is above 0.5 rad/s: then only the points in contact are on the ground, they give the first velocity, the tilt is
+    if a rate is above 0.5 rad/s, also with all points in contact: then only the points in contact are on the ground, they give the first velocity, the tilt is
     theirs, or the accelerometer's where they lie in one line, and the result has a warning. The world's
     origin is midway between the soles, and x is the heading of the feet; for feet of one contact point it is
     the heading of the pattern in which they stand. Yaw and horizontal position drift. After a jump
@@ -181,10 +182,10 @@ class StateEstimator(InertialEstimator):
         if airborne and trust.aligned > 0:
             trust.flown = True
         if trust.gate == 0.0:  # the first tick: the feet point along x
-            trust.gate = params.gate
             trust.facing = True
             trust.stepped = not estimate.stood
             trust.unrest = _FIRST_UNREST if trust.stepped else 0.0
+            trust.gate = max(params.gate, params.unrest_factor * trust.unrest)
             trust.age = 0.0 if trust.stepped else math.inf
         elif fastest == math.inf:  # a foot that steps points elsewhere afterwards
             trust.facing = False
@@ -233,9 +234,11 @@ def correct_tilt_by_velocity(
     support: float,
 ) -> None:
     """Correct the tilt by what the standing points say of the velocity: a tilt error is a false acceleration."""
+    if trust.age < _SETTLING:
+        return
     residual = scratch.residual
     limit(residual, 0.3, residual)
-    time = min(max(trust.age, _FIRST_TILT_TIME), params.tilt_time)
+    time = min(trust.age, params.tilt_time)
     gain = support * constants.velocity_gain / (GRAVITY * time)
     rotate_in_world(estimate.orientation, -gain * residual[1], gain * residual[0], 0.0)
 

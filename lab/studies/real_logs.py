@@ -19,7 +19,7 @@ from pathlib import Path
 from ...plotting import Curve, Panel, save_panels
 from . import DATA, ROOT, icub_estimators, pendulum_dynamics, swing_up
 
-PARTS = ("estimators", "dynamics", "swing_up")
+PARTS = ("estimators", "starts", "dynamics", "swing_up")
 
 
 def _dynamics(picture: Path | None) -> Iterator[str]:
@@ -54,6 +54,8 @@ def main() -> None:
             lines = icub_estimators.rows()
             if picture is not None:
                 icub_estimators.draw(picture)
+        elif part == "starts":
+            lines = icub_estimators.start_rows()
         elif part == "dynamics":
             lines = _dynamics(picture)
         else:

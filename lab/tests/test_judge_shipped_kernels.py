@@ -48,6 +48,14 @@ def test_another_number_is_seen(jumping: Samples) -> None:
 
 
 @pytest.mark.long
+def test_the_kernels_of_tasks_are_numbas(jumping: Samples) -> None:
+    tasks = {name: rows[-1:] for name, rows in jumping.items() if ".control.tasks." in name}
+    verdict = judge(tasks, numba=True)
+    assert not verdict.wrong, verdict.wrong
+    assert len(+verdict.numba) >= 8, verdict.numba
+
+
+@pytest.mark.long
 def test_the_steps_of_all_shipped_blocks_are_numpys() -> None:
     samples: Samples = {}
     for graph, duration in GRAPHS.items():

@@ -128,6 +128,9 @@ def difference(kernel: Any, arguments: Sequence[Any], found: Sequence[Any]) -> s
     """
     expected = copied(arguments)
     by_numpy(kernel, expected)
+    pairs = zip(arrays_in(found), arrays_in(expected), strict=True)
+    if all(one.tobytes() == other.tobytes() for one, other in pairs):
+        return ""  # no rounding to explain
     spread = [np.zeros(each.shape) for each in arrays_in(expected)]
     chance = np.random.default_rng(0)
     at_threshold = False

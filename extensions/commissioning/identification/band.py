@@ -75,9 +75,9 @@ class LowPass:
         step = max(1, round(1.0 / (3.0 * band * period)))
         return cls(weights, slopes, np.arange(reach, count - reach, step, dtype=np.int64))
 
-    def __call__(self, values: Array, *, derivative: bool = False) -> Array:
-        """Low-pass (n, ...) values, or their derivative, at the instants."""
-        weights = self.slopes if derivative else self.weights
+    def __call__(self, values: Array, *, derivative: bool = False, age: float = 0.0) -> Array:
+        """Low-pass (n, ...) values of some age [s], or their derivative, at the instants."""
+        weights = self.slopes if derivative else self.weights - age * self.slopes
         reach, flat = len(weights) // 2, values.reshape(len(values), -1)
         out = np.empty((len(self.centres), flat.shape[1]))
         for row, centre in enumerate(self.centres.tolist()):

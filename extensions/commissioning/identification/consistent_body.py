@@ -60,7 +60,7 @@ def consistent_dynamics(model: DynamicsModel, fit: FittedDynamics) -> Consistent
         IdentificationError: the solver finds none.
     """
     import clarabel
-    from scipy import sparse
+    from scipy import linalg, sparse
 
     links, count = model.links, len(fit.value)
     described = links.described
@@ -74,13 +74,16 @@ def consistent_dynamics(model: DynamicsModel, fit: FittedDynamics) -> Consistent
     to_value[others, range(width, width + len(others))] = 1.0
     deviation = np.sqrt(np.diag(fit.covariance))
     correlation = fit.covariance / np.outer(deviation, deviation)
-    whitened = np.linalg.inv(np.linalg.cholesky(correlation + 1e-9 * np.eye(count))) / deviation
-    rows = whitened @ to_value
-    quadratic = rows.T @ rows
-    linear = -rows.T @ (whitened @ fit.value)
-    at_home = described / scales
-    quadratic[range(width), range(width)] += DESCRIBED
-    linear[:width] -= DESCRIBED * at_home
+    spread = deviation[:, None] * np.linalg.cholesky(correlation + 1e-9 * np.eye(count))
+    # Steps from values with what was fitted, in its standard deviations and in what it leaves open: from zero, or in plain
+    # numbers, the solver's tolerance is many deviations.
+    home = np.concatenate([described / scales, fit.value[others]])
+    back = np.linalg.pinv(to_value)
+    start = home + back @ (fit.value - to_value @ home)
+    steps = np.hstack([back @ spread, linalg.null_space(to_value)])
+    quadratic = DESCRIBED * steps[:width].T @ steps[:width]
+    quadratic[range(count), range(count)] += 1.0
+    linear = DESCRIBED * steps[:width].T @ (start - home)[:width]
     blocks, right, cones = [], [], []
     for link in range(width // 10):
         block, side = _pseudo_rows(link, to_value.shape[1], scales)
@@ -97,16 +100,17 @@ def consistent_dynamics(model: DynamicsModel, fit: FittedDynamics) -> Consistent
         cones.append(clarabel.NonnegativeConeT(len(positive)))
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    all_rows = np.vstack(blocks)
     solver = clarabel.DefaultSolver(
-        sparse.csc_matrix(np.triu(quadratic)), linear, sparse.csc_matrix(np.vstack(blocks)),
-        np.concatenate(right), cones, settings,
+        sparse.csc_matrix(np.triu(quadratic)), linear, sparse.csc_matrix(all_rows @ steps),
+        np.concatenate(right) - all_rows @ start, cones, settings,
     )  # fmt: skip
     solution = solver.solve()
     if str(solution.status) not in ("Solved", "AlmostSolved"):
         raise IdentificationError(
             f"no bodies near to what was fitted were found (Clarabel: {solution.status})"
         )
-    found = np.array(solution.x)
+    found = start + steps @ np.array(solution.x)
     value = to_value @ found
     value[model.part("load").start + model.without_load] = 0.0
     moved = np.abs(value - fit.value) / deviation

@@ -74,7 +74,6 @@ class FormedLog:
     low: LowPass
     motions: tuple[Motion, Motion]
     rows: tuple[Array, Array]
-    passed: tuple[Array, Array]
     torque: Array
 
 
@@ -147,7 +146,6 @@ class DynamicsModel:
             low,
             motions,
             (rows[0], rows[1]),
-            (low(rows[0]), low(rows[1])),
             low(torque),
         )
 
@@ -199,26 +197,26 @@ class DynamicsModel:
         scale = np.ones(whole.shape[1])
         scale[first:] = np.exp(-value[part("log constant")])
         age = float(value[part("age of torques")][0])
-        passed, late = low(whole), low(whole, derivative=True)
-        out = scale * (passed - age * late)
+        out = scale * low(whole, age=age)
         jacobian = np.zeros((*out.shape, len(value)))
-        jacobian[:, :, part("base")] = formed.passed[half]
-        more = value[part("load")] * sign * np.sign(loaded)
-        jacobian[:, first:, part("base")] += low(more[:, :, None] * rows[:, first:])
+        with_load = 1.0 + value[part("load")] * sign * np.sign(loaded)
+        base = rows.copy()
+        base[:, first:] *= with_load[:, :, None]
+        jacobian[:, :, part("base")] = low(base, age=age)
         told = self.links.told_rotors
         for kind, columns, own in (
-            ("rotor inertia", acceleration, told), ("coulomb", sign, range(self.n)),
+            ("rotor inertia", with_load * acceleration, told), ("coulomb", sign, range(self.n)),
             ("viscous", speed, range(self.n)), ("load", load, range(self.n)),
         ):  # fmt: skip
             for k, j in enumerate(own):
                 single = np.zeros_like(speed)
                 single[:, j] = columns[:, j]
-                jacobian[:, :, part(kind).start + k] = low(self._padded(single))
+                jacobian[:, :, part(kind).start + k] = low(self._padded(single), age=age)
         jacobian *= scale[:, None]
         for j in range(self.n):
             jacobian[:, first + j, part("log constant").start + j] = -out[:, first + j]
             jacobian[:, first + j, part("offset").start + j] = 1.0
-        jacobian[:, :, part("age of torques").start] = -scale * late
+        jacobian[:, :, part("age of torques").start] = -scale * low(whole, derivative=True)
         out[:, first:] += value[part("offset")]
         return out, jacobian
 

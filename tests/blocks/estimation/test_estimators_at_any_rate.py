@@ -130,6 +130,17 @@ def test_a_start_in_a_step_is_told_and_a_start_at_rest_is_not():
     assert not standing(StateEstimator).block.warnings()
 
 
+def test_a_robot_that_moves_on_both_feet_does_not_stand_at_the_start():
+    bench = BlockBench(StateEstimator, robot="bruce")
+    speed = [-0.6 if "knee" in joint.name else 0.0 for joint in ROBOT.joints]
+    bench.set("joints", position=ROBOT.standing_position, velocity=speed)
+    bench.set("imu", specific_force=[0.0, 0.0, GRAVITY])
+    bench.set("contacts", active=True)
+    bench.step()
+    assert "began while the robot was stepping" in bench.block.warnings()[0]
+    assert np.abs(bench.get("base").linear_velocity).max() > 0.01, "the legs give the velocity"
+
+
 def test_feet_that_roll_open_the_gate_and_feet_that_stand_do_not():
     bench = standing(StateEstimator)
     bench.step(500)

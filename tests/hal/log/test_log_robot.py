@@ -272,7 +272,7 @@ def test_the_default_estimator_follows_a_real_robot_at_any_rate(tmp_path, rate, 
 
 @needs_icub
 @pytest.mark.long
-@pytest.mark.parametrize("begin", [6.1, 6.9, 8.0])
+@pytest.mark.parametrize("begin", [6.1, 6.9, 7.6, 8.0, 9.7])  # 7.6, 9.7: on both feet, moving
 def test_a_log_may_begin_in_a_step_of_a_real_robot(tmp_path, begin):
     pytest.importorskip("h5py")
     robot = icub_estimators.write_robot(tmp_path)
