@@ -28,11 +28,9 @@ from result_tables import (
     TICK_PICTURE,
     agreement_table,
     comparison_table,
-    direction_table,
     effects_table,
     every_robot_table,
     frontier_table,
-    impulse_table,
     mutated_robots_table,
     noted_table,
     quarter_table,
@@ -155,11 +153,7 @@ def write_frontier(folder: Path) -> None:
 def write_landing(*files: Path) -> None:
     """Write where the landing laws place the feet after a push: two studies."""
     for mark, file in zip(("", " 12 cm"), files, strict=False):
-        rows = read_json(file)["rows"]
-        for name, made in (
-            ("impulses", impulse_table), ("quarters", quarter_table), ("directions", direction_table),
-        ):  # fmt: skip
-            refresh(DOCS / "landing.md", name + mark, made(rows))
+        refresh(DOCS / "landing.md", "quarters" + mark, quarter_table(read_json(file)["rows"]))
 
 
 def write_results() -> None:

@@ -154,10 +154,6 @@ def _direction(each: Row) -> Sequence[str]:
 
 QUARTERS = {"ahead": 0, "left": 90, "back": 180, "right": 270}
 """Each with the directions within 45 degrees of it, those at its edges counted half on each side."""
-SPEED = 5.118 * (9.80665 * 0.32) ** 0.5
-"""The impulse [N s] that changes BRUCE's speed by sqrt(g h), with h = 0.32 m."""
-SHIPPED = "predicted"
-"""The arm of the shipped law."""
 
 
 def values_of(rows: Sequence[Row], name: str) -> list[Any]:
@@ -168,23 +164,6 @@ def values_of(rows: Sequence[Row], name: str) -> list[Any]:
 def rate(successes: float, runs: float) -> str:
     """Format a success rate in percent, or a dash where nothing was run."""
     return percent(successes / runs) if runs else "-"
-
-
-def count(rows: Sequence[Row], **wanted: object) -> tuple[int, int]:
-    """Count successes and runs of the rows with these values."""
-    mine = [row for row in rows if all(row[name] == value for name, value in wanted.items())]
-    return sum(row["successes"] for row in mine), sum(row["n"] for row in mine)
-
-
-def impulse_table(rows: Sequence[Row]) -> str:
-    """Format success over all directions, a line an arm, a column an impulse."""
-    impulses = values_of(rows, "impulse_n_s")
-    lines = []
-    for arm in values_of(rows, "arm"):
-        counts = (count(rows, arm=arm, impulse_n_s=impulse) for impulse in impulses)
-        lines.append((arm, *(f"{done} of {n} ({rate(done, n)})" for done, n in counts)))
-    names = [f"{impulse:g} N s, {impulse / SPEED:.3f} sqrt(g h)" for impulse in impulses]
-    return table(("arm", *names), lines)
 
 
 def quarter_table(rows: Sequence[Row]) -> str:
@@ -202,23 +181,6 @@ def quarter_table(rows: Sequence[Row]) -> str:
             cells.append(rate(done, n))
         lines.append((arm, *cells))
     return table(("arm", *QUARTERS), lines)
-
-
-def direction_table(rows: Sequence[Row]) -> str:
-    """Format the shipped law's and the best other arm's successes, a line a direction."""
-    impulses = values_of(rows, "impulse_n_s")
-    others = [arm for arm in values_of(rows, "arm") if arm != SHIPPED]
-    lines = []
-    for direction in sorted({row["direction_deg"] for row in rows}):
-        cells = []
-        for impulse in impulses:
-            where = {"direction_deg": direction, "impulse_n_s": impulse}
-            done, n = count(rows, arm=SHIPPED, **where)
-            best = max((count(rows, arm=arm, **where)[0] for arm in others), default=0)
-            better = f" (best other arm {best})" if best > done else ""
-            cells.append(f"{done} of {n}{better}")
-        lines.append((f"{direction:g} deg", *cells))
-    return table(("direction", *(f"{impulse:g} N s" for impulse in impulses)), lines)
 
 
 SEEDS = range(6000, 6020)  # chosen before looking, and never run while anything was tuned

@@ -74,6 +74,8 @@ MEDIANS: Mapping[str, Mapping[str, tuple[str, float]]] = {
 """Columns of a study's table beside the counts: a metric, and its factor. The median is over the runs that stand."""
 STANDS_TILT = 5.0
 """deg, at rest; the paper's criterion in words is that the robot lands stably."""
+HEADS = {"impulse_n_s": "impulse [N s]"}
+"""Heads of a table's columns that are not their labels."""
 OUTCOMES = ("n", "successes", "stands")
 
 
@@ -196,7 +198,13 @@ def kind_of_miss(reason: str) -> str:
 def table_of(data: Mapping[str, Any]) -> str:
     """Return the Markdown table of a data file."""
     labels, medians = data["labels"], data.get("medians", [])
-    head = [*labels, *medians, "stands", "succeeds", "misses"]
+    head = [
+        *(HEADS.get(label, label) for label in labels),
+        *medians,
+        "stands",
+        "succeeds",
+        "misses",
+    ]
     lines = [f"| {' | '.join(head)} |", "|" + "---|" * len(head)]
     for row in data["rows"]:
         misses = sorted(row["misses"].items(), key=lambda item: (-item[1], item[0]))
@@ -214,7 +222,8 @@ def made_line(data: Mapping[str, Any]) -> str:
     seeds = data["seeds"]
     alike = len({row["n"] for row in data.get("rows", [])}) <= 1
     each = "" if alike else " (a row has as many as it has runs, from the first)"
-    made = f"Seeds {seeds[0]} to {seeds[-1]}{each}, code of commit {data['commit'][:8]}."
+    which = f"Seeds {seeds[0]} to {seeds[-1]}" if len(seeds) > 1 else f"Seed {seeds[0]}"
+    made = f"{which}{each}, code of commit {data['commit'][:8]}."
     if "same_at" in data and data["same_at"] != data["commit"]:
         count = len(data["probes"])
         made += f" With the code of commit {data['same_at'][:8]} the {count} of them that were run again are the same to the last bit."

@@ -25,19 +25,7 @@ ROWS = [
 ]  # fmt: skip
 
 
-def test_rates_over_all_directions(script: ModuleType) -> None:
-    lines = script.impulse_table(ROWS).splitlines()
-    assert lines[0] == "| arm | 0.7 N s, 0.077 sqrt(g h) | 1.1 N s, 0.121 sqrt(g h) |"
-    assert lines[2] == "| predicted | 13 of 20 (65 %) | 2 of 10 (20 %) |"
-
-
 def test_a_direction_between_two_quarters_counts_half_in_each(script: ModuleType) -> None:
     lines = script.quarter_table(ROWS).splitlines()
     assert lines[0] == "| arm | ahead | left | back | right |"
     assert lines[2] == "| predicted | 52 % | 40 % | - | - |"
-
-
-def test_where_another_arm_is_better_the_page_says_so(script: ModuleType) -> None:
-    lines = script.direction_table(ROWS).splitlines()
-    assert lines[2] == "| 0 deg | 9 of 10 | 2 of 10 |"
-    assert lines[3] == "| 45 deg | 4 of 10 (best other arm 6) | 0 of 0 |"
