@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from .array_equations import ArrayEquations
-from .expressions import NUMBERS, cloned, numbers
+from .expressions import NUMBERS, cloned, numbers, shown
 from .kernel_registry import is_kernel
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind
 from .slices import called
@@ -224,6 +224,9 @@ class ArrayFunctions(ArrayEquations):
                 node.value = ast.Tuple(elements, ast.Load())
                 for each in ast.walk(node.value):
                     ast.copy_location(each, value)
+            elif isinstance(kind, ArrayKind) and kind.rank and not self._root(value):
+                text = f"{len(target.elts)} names take an array of shape {shown(kind.shape)}; read its elements one after the other"
+                raise self._error(node, text)
 
     def _is_foreign(self, target: ast.expr, value: ast.expr, whole: bool) -> bool:
         """Return whether an equation has a function that makes an array, and that kernels do not know:

@@ -22,7 +22,7 @@ from .kinds import (
     argument_kinds,
 )
 
-VERSION = 9
+VERSION = 10
 """Counts changes of what a statement is rewritten into: machine code made before is not used."""
 
 Node = TypeVar("Node", bound=ast.AST)

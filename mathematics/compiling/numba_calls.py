@@ -32,8 +32,8 @@ SYMBOL = "numba_"
 """Beginning of the names of the made functions; 32 hexadecimal digits follow."""
 
 NO_CODE = "does not compile"
-_OBJECTS = re.compile(r"load ptr, ptr @_ZN08NumbaEnv")
-"""In the code of a function that needs objects of Python, which Numba keeps in its own process."""
+_OBJECTS = {"print", "objmode"}
+"""Names in functions that need objects of Python, which Numba keeps in its own process; others need them for errors only."""
 
 _addresses: dict[str, int] = {}
 _alive: list[Any] = []
@@ -230,7 +230,7 @@ def _make(function: Any, signature: tuple[ArgumentType, ...]) -> Translated:
     if not store.holds(symbol.removeprefix(SYMBOL)):
         entry = _entry(function, signature, returns, several)
         _alive.append(entry)
-        if _OBJECTS.search(entry.inspect_llvm()):
+        if names_read(function) & _OBJECTS:
             _addresses[symbol] = entry.address
         else:
             code, needs = object_of(entry.inspect_llvm(), entry.native_name, symbol)

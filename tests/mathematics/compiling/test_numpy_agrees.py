@@ -402,6 +402,11 @@ def rows_by_a_list(A: Matrix3) -> None:
 
 
 @kernel
+def taken_apart(B: Array2D, y: Vector3) -> None:
+    y[2], y[0] = np.sign(B[1, 1:])
+
+
+@kernel
 def new_axis(u: Vector3, A: Matrix3) -> None:
     A[:] = u[:, None] * u
 
@@ -453,6 +458,10 @@ def test_what_kernels_do_not_know_is_numpys_in_plain_python_and_named() -> None:
         (
             rows_by_a_list,
             "A[[0, 2]]: an index is a number; take one row, or element, after the other",
+        ),
+        (
+            taken_apart,
+            "2 names take an array of shape (?,); read its elements one after the other",
         ),
         (new_axis, "u[:, None]: None adds a dimension; write np.outer, or a loop"),
         (changing_step, "the step of a[::k] is not a constant"),
