@@ -76,6 +76,8 @@ STANDS_TILT = 5.0
 """deg, at rest; the paper's criterion in words is that the robot lands stably."""
 HEADS = {"impulse_n_s": "impulse [N s]"}
 """Heads of a table's columns that are not their labels."""
+AXES = {"impulse_n_s": "impulse={:g} N s"}
+"""What ``--where`` takes for a label that has a unit."""
 OUTCOMES = ("n", "successes", "stands")
 
 
@@ -138,7 +140,8 @@ def run_again(study: Path, probe: Mapping[str, Any]) -> list[str]:
     """Return the hashes of a probe's runs with the present code: of more than one where the labels leave out an axis."""
     from pyarrow import parquet
 
-    chosen = [text for pair in probe["where"].items() for text in ("--where", "=".join(pair))]
+    pairs = (AXES.get(label, f"{label}={{}}").format(at) for label, at in probe["where"].items())
+    chosen = [text for pair in pairs for text in ("--where", pair)]
     seeds = f"{probe['seed']}:{probe['seed'] + 1}"
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run(
