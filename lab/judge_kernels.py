@@ -157,10 +157,12 @@ class Judge:
         if exported := first[:: self._exported_every] if self._exported_every else []:
             self._by_exported_library(module, exported)
 
-    def _wrong(self, module: Any, name: str, text: str) -> None:
+    def _text_of(self, module: Any, name: str) -> str:
         source = Path(module.__file__).read_text()
-        body = source[source.index(f"def {name}(") :].split("\n\n")[0]
-        self.tally.wrong.append(f"{text}\n{body}")
+        return source[source.index(f"def {name}(") :].split("\n\n")[0]
+
+    def _wrong(self, module: Any, name: str, text: str) -> None:
+        self.tally.wrong.append(f"{text}\n{self._text_of(module, name)}")
 
     def _refused(self, module: Any, name: str, text: str) -> None:
         self.tally.counts["refused"] += 1
@@ -275,6 +277,9 @@ class Judge:
 
         from ..mathematics.compiling.kernel_registry import is_kernel, written_code
 
+        if re.search(r"norm\(.*:-", self._text_of(module, judged.name)):
+            self.tally.counts["not Numba's"] += 1  # its norm of a reversed vector is wrong
+            return
         names = dict(vars(module))
         for each, value in list(names.items()):
             if is_kernel(value):
