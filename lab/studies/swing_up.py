@@ -59,8 +59,8 @@ def moments() -> tuple[float, float]:
     return max(found[0], 1e-4), max(found[1], 1e-4)
 
 
-def write_robot(folder: Path, free: bool = False) -> Path:
-    """Write the pendubot's description, ``free`` of friction and rotors."""
+def write_robot(folder: Path, free: bool = False, elbow: float = FRICTION) -> Path:
+    """Write the pendubot's description, ``free`` of friction and rotors, or with another friction of its ``elbow`` [N m]."""
     first, second = moments()
 
     def link(name: str, mass: float, com: float, moment: float) -> str:
@@ -86,7 +86,7 @@ def write_robot(folder: Path, free: bool = False) -> Path:
         + (
             "  free: {friction: 0, damping: 0, rotor_inertia: 0}\n"
             if free
-            else f"  real: {{friction: {FRICTION}, damping: 0.001, rotor_inertia: {ROTOR}}}\n"
+            else f"  real: {{friction: {FRICTION}, damping: 0.001, rotor_inertia: {ROTOR}, motors: {{elbow: {{friction: {elbow}}}}}}}\n"
         )
         + "sensors: {imu: false, switches: false}\n"
     )
@@ -184,7 +184,7 @@ class Controller(Block):
 
 def graph_of(robot: Path, effect: Mapping[str, Any], duration: float = 20.0) -> dict[str, Any]:
     """Return the graph of the swing-up with an effect of ``EFFECTS``."""
-    actuators = {"gears": effect["gears"]} if "gears" in effect else {}
+    actuators = {part: effect[part] for part in ("gears", "joints") if part in effect}
     return {
         "rate": "400 Hz", "duration": f"{duration} s", "robot": str(robot),
         "blocks": {
@@ -193,6 +193,7 @@ def graph_of(robot: Path, effect: Mapping[str, Any], duration: float = 20.0) -> 
                 "with": {
                     "latency": effect.get("latency", "0 ms"),
                     "timestep": "0.25 ms", "start": {"stand": False}, "ground": {"scene": "none"}, "actuators": actuators,
+                    "sensors": effect.get("sensors", {}),
                 },
                 "in": {"command": "controller.command"},
             },
@@ -231,7 +232,7 @@ def figures(time: Array, angles: Array, torque: Array) -> dict[str, Any]:
 def run_of(effect: Mapping[str, Any], duration: float) -> tuple[Array, Array, Array]:
     """Run the swing-up with an effect, and return times (n,), angles (n, 2) and commanded torques (n, 2)."""
     with tempfile.TemporaryDirectory() as folder:
-        robot = write_robot(Path(folder), "free" in effect)
+        robot = write_robot(Path(folder), "free" in effect, effect.get("elbow", FRICTION))
         result = load(graph_of(robot, effect, duration)).run()
     result.raise_if_failed()
     angles = np.asarray(result.signal("robot.joints.position"))

@@ -117,9 +117,7 @@ def description_text(found: IdentifiedDynamics, files: list[Path]) -> str:
     values = {key: found.values(kind) for key, kind in keys.items()}
     lines = [
         f"# {model.robot.name} as {', '.join(file.name for file in files)} show it, found by `aloft robot identify`.",
-        "profiles:",
-        "  identified:",
-        "    motors:",
+        *(("profiles:", "  identified:", "    motors:") if model.joints else ()),
     ]
     for joint in model.joints:
         lines.append(f"      {joint}:")
