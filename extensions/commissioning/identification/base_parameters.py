@@ -7,7 +7,8 @@ frame, and in the rotors' inertias:
 
 Many of them act only together, such as the inertia of a first link and the mass that the second hangs at its end. Links
 from the last to the first, and of each its moments and inertias before its mass, keep the columns of Y that do not depend on
-those before; what depends on them is added to them. So a base parameter is a link's own parameter and what further links add.
+those before; what depends on them is added to them. The masses of a floating base begin with its own. So a base parameter is
+a link's own parameter and what further links add.
 """
 
 from __future__ import annotations
@@ -85,7 +86,9 @@ class LinkRegressor:
         whole = self._links_rows(motion)
         count = whole.shape[2] // 10
         order = [10 * k + p for k in range(count - 1, -1, -1) for p in ORDER if p]
-        order += [10 * k for k in range(count - 1, -1, -1)]
+        masses = [10 * k for k in range(count - 1, -1, -1)]
+        # a floating base's own mass first: that of every other link acts at its joint
+        order += masses[::-1] if self.floating else masses
         columns = whole.reshape(-1, whole.shape[2])[:, order]
         rotors = np.zeros((SAMPLES, whole.shape[1], n))
         for j in range(n):

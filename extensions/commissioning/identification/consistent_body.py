@@ -74,7 +74,9 @@ def consistent_dynamics(model: DynamicsModel, fit: FittedDynamics) -> Consistent
     to_value[others, range(width, width + len(others))] = 1.0
     deviation = np.sqrt(np.diag(fit.covariance))
     correlation = fit.covariance / np.outer(deviation, deviation)
-    spread = deviation[:, None] * np.linalg.cholesky(correlation + 1e-9 * np.eye(count))
+    # where a log tells little of many links, rounding makes it indefinite
+    least = 1e-9 - 2.0 * min(0.0, float(np.linalg.eigvalsh(correlation)[0]))
+    spread = deviation[:, None] * np.linalg.cholesky(correlation + least * np.eye(count))
     # Steps from values with what was fitted, in its standard deviations and in what it leaves open: from zero, or in plain
     # numbers, the solver's tolerance is many deviations.
     home = np.concatenate([described / scales, fit.value[others]])

@@ -8,7 +8,8 @@ with the base parameters b (``base_parameters``), rotors R, Coulomb friction C, 
 s(v) = tanh(v / v_0), a torque constant k relative to that with which the log was made, and an offset o.
 
 A floating base has six equations more, without a torque, and forces of the ground in all of them: measured ones are known,
-others are projected out (``ground_forces``), and k (u - o) stands on the known side, for the projection mixes joints. Without
+others are projected out (``ground_forces``), and k (u - o) stands on the known side, for the projection mixes joints; all are
+divided by the mean k, or noise would be least with all unknowns at zero. Without
 torques the six are all, with the base parameters as the only unknowns. If nothing but gravity acts on such a robot, in
 flight, all six scale together, so its mass is taken from the description.
 
@@ -23,6 +24,7 @@ known no better than by these priors, or by a joint whose torque is trusted.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -83,7 +85,7 @@ class Unknowns:
 
 @dataclass
 class FormedLog:
-    """The equations of one log: motion and rows by both halves, the measured torques, these and what is known of the ground's forces
+    """The equations of one log: motion and rows by both halves, the measured torques, these with what is known of the ground's forces and the latter,
     low-passed, what projects the equations, and what it leaves of each (n_equations)."""
 
     log: MotionLog
@@ -92,6 +94,7 @@ class FormedLog:
     rows: tuple[Array, Array]
     measured: Array
     torque: Array
+    known: Array
     through: Array | None
     share: Array
 
@@ -101,6 +104,17 @@ class FormedLog:
             return values
         wide = self.through @ values.reshape(*values.shape[:2], -1)
         return np.asarray(wide.reshape(values.shape))
+
+    def left_of_joints(self, columns: Array, joints: Iterable[int], first: int) -> Array:
+        """Return what they leave of one column (n,) a joint, each as an equation of its own, (n, n_equations, n_columns)."""
+        chosen = list(joints)
+        whole = np.zeros((len(columns), len(self.share), len(chosen)))
+        for k, j in enumerate(chosen):
+            if self.through is None:
+                whole[:, first + j, k] = columns[:, j]
+            else:
+                whole[:, :, k] = self.through[:, :, first + j] * columns[:, j, None]
+        return whole
 
 
 @dataclass(frozen=True)
@@ -178,14 +192,14 @@ class DynamicsModel:
         torque[:, self.first :] = measured
         width = len(self.equations)
         first, second = (self.links.rows(motion)[:, :width] for motion in motions)
-        through, share = None, np.ones(width)
+        through, share, known = None, np.ones(width), np.zeros((count, width))
         if self.first:
             middle = 0.5 * (motions[0].position + motions[1].position)
             through, known = equations_left(log, band, self.links, middle, width)
             torque = (through @ torque[:, :, None])[:, :, 0] + known
             share = np.diagonal(through, axis1=1, axis2=2).mean(axis=0)
         return FormedLog(
-            log, low, motions, (first, second), measured, low(torque), through, share
+            log, low, motions, (first, second), measured, low(torque), low(known), through, share
         )  # fmt: skip
 
     def prior_std(self, logs: list[FormedLog]) -> Array:
@@ -239,9 +253,8 @@ class DynamicsModel:
         friction = friction + value[part("load")] * load
         whole = drive + self._padded(friction)
         constant = np.exp(value[part("log constant")])
-        scale = np.ones(whole.shape[1])
-        if not first:
-            scale[:] = 1.0 / constant
+        mean = float(np.exp(value[part("log constant")].sum() / max(1, n)))
+        scale = np.full(whole.shape[1], 1.0 / mean) if first else 1.0 / constant
         age = float(value[part("age of torques")].sum())
         whole = left(whole)
         out = scale * low(whole, age=age)
@@ -255,8 +268,7 @@ class DynamicsModel:
             ("rotor inertia", with_load * acceleration, told), ("coulomb", sign, every),
             ("viscous", speed, every), ("load", load, every),
         ):  # fmt: skip
-            for k, j in enumerate(own):
-                jacobian[:, :, part(kind).start + k] = low(left(self._single(columns, j)), age=age)
+            jacobian[:, :, part(kind)] = low(formed.left_of_joints(columns, own, first), age=age)
         jacobian *= scale[:, None]
         offset, slope = value[part("offset")], scale * low(whole, derivative=True)
         jacobian[:, :, part("age of torques")] = -slope[:, :, None][:, :, : min(n, 1)]
@@ -266,20 +278,16 @@ class DynamicsModel:
                 jacobian[:, j, part("offset").start + j] = 1.0
             out += offset
         elif n:
-            driven = constant * (formed.measured - offset)
+            driven = constant / mean * (formed.measured - offset)
+            made = low(formed.left_of_joints(driven, every, first))
+            # a common factor of all constants scales all but the torques
+            common = out - made.sum(axis=2) - formed.known / mean
+            jacobian[:, :, part("log constant")] = -made - common[:, :, None] / n
+            ones = np.tile(constant / mean, (len(driven), 1))
+            jacobian[:, :, part("offset")] = low(formed.left_of_joints(ones, every, first))
             out += low(left(self._padded(formed.measured - driven)))
-            for j in every:
-                made = low(left(self._single(driven, j)))
-                jacobian[:, :, part("log constant").start + j] = -made
-                ones = np.full_like(driven, constant[j])
-                jacobian[:, :, part("offset").start + j] = low(left(self._single(ones, j)))
+            out += (1.0 - 1.0 / mean) * formed.known
         return out, jacobian
-
-    def _single(self, columns: Array, joint: int) -> Array:
-        """Return the column of one joint as rows of all equations."""
-        one = np.zeros_like(columns)
-        one[:, joint] = columns[:, joint]
-        return self._padded(one)
 
     def _padded(self, joints: Array) -> Array:
         """Return torques of joints (n, n_joints) as rows of all equations."""
@@ -364,7 +372,7 @@ def _fitted(model: DynamicsModel, logs: list[MotionLog], band: float) -> FittedD
     if share.mean() < LEAST_LEFT:
         raise IdentificationError(
             f"the ground's forces leave {share.mean():.1%} of the equations of {logs[0].name}: its feet stand all the time, and without "
-            "torques or measured forces nothing is told. Log the feet's forces (contacts: force), torques, or jumps"
+            "torques or whole wrenches nothing is told. Log forces and moments of the feet (contacts: force), torques, or jumps"
         )
     value = model.mean.copy()
     std = model.prior_std(formed)
