@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 KINDS = (
     ("rotor inertia", "kg m^2"), ("coulomb", "N m"), ("viscous", "N m s/rad"), ("load", "of the torque"),
     ("torque constant", "of the log's"), ("offset", "N m"), ("age of torques", "s"),
+    ("accelerometer offset", "m/s^2"),
 )  # fmt: skip
 
 

@@ -146,6 +146,16 @@ class LinkRegressor:
         pin.updateFramePlacements(model, data)
         return [pin.getFrameJacobian(model, data, f, pin.ReferenceFrame.LOCAL) for f in self.soles]
 
+    def lifting(self, position: Array) -> Array:
+        """Return what a unit of each axis of the base's specific force adds to the description's equations, (n, n_velocities, 3)."""
+        pin, model, data, found = self._pin, self.model, self.data, []
+        q = np.zeros(model.nq)
+        q[6] = 1.0
+        for angles in position:
+            q[7:] = angles
+            found.append(pin.crba(model, data, q)[:3].T.copy())
+        return np.array(found)
+
     def _states(self, motion: Motion, k: int) -> tuple[Array, Array, Array]:
         joints = motion.position.shape[1]
         if not self.floating:

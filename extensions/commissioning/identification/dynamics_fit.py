@@ -10,7 +10,7 @@ s(v) = tanh(v / v_0), a torque constant k relative to that with which the log wa
 A floating base has six equations more, without a torque, and forces of the ground in all of them: measured ones are known,
 others are projected out (``ground_forces``), and k (u - o) stands on the known side, for the projection mixes joints; all are
 divided by the mean k, or noise would be least with all unknowns at zero. Without
-torques the six are all, with the base parameters as the only unknowns. If nothing but gravity acts on such a robot, in
+torques the six are all, with the base parameters as unknowns, and the accelerometer's offset, which acts as weight does. If nothing but gravity acts on such a robot, in
 flight, all six scale together, so its mass is taken from the description.
 
 Both sides are low-passed in the band that the motors drive (``band``). Unknowns are found by instrumental variables: equations by
@@ -86,7 +86,7 @@ class Unknowns:
 @dataclass
 class FormedLog:
     """The equations of one log: motion and rows by both halves, the measured torques, these with what is known of the ground's forces and the latter,
-    low-passed, what projects the equations, and what it leaves of each (n_equations)."""
+    low-passed, what the base's specific force adds, what projects the equations, and what it leaves of each (n_equations)."""
 
     log: MotionLog
     low: LowPass
@@ -95,6 +95,7 @@ class FormedLog:
     measured: Array
     torque: Array
     known: Array
+    lifting: Array
     through: Array | None
     share: Array
 
@@ -163,6 +164,7 @@ class DynamicsModel:
         for kind in ("coulomb", "viscous", "load", "log constant", "offset"):
             unknowns.add(f"{kind} of", self.joints, 0.0)
         unknowns.add("age of torques", [""] if n else [], 0.0)
+        unknowns.add("accelerometer offset of", [*"xyz"] if self.first else [], 0.0)
         self.mean, self.n, self.speed = np.array(unknowns.mean), n, SPEED
         self.without_load = np.zeros(0, np.int64)
         self.constant_std = np.full(n, CONSTANT_STD)
@@ -193,13 +195,16 @@ class DynamicsModel:
         width = len(self.equations)
         first, second = (self.links.rows(motion)[:, :width] for motion in motions)
         through, share, known = None, np.ones(width), np.zeros((count, width))
+        lifting = np.zeros((count, width, 0))
         if self.first:
             middle = 0.5 * (motions[0].position + motions[1].position)
+            lifting = self.links.lifting(middle)[:, :width]
             through, known = equations_left(log, band, self.links, middle, width)
             torque = (through @ torque[:, :, None])[:, :, 0] + known
             share = np.diagonal(through, axis1=1, axis2=2).mean(axis=0)
         return FormedLog(
-            log, low, motions, (first, second), measured, low(torque), low(known), through, share
+            log, low, motions, (first, second), measured, low(torque), low(known), lifting,
+            through, share,
         )  # fmt: skip
 
     def prior_std(self, logs: list[FormedLog]) -> Array:
@@ -234,6 +239,7 @@ class DynamicsModel:
         std[self.part("log constant")] = self.constant_std
         std[self.part("offset")] = 0.1 * typical
         std[self.part("age of torques")] = AGE_STD
+        std[self.part("accelerometer offset")] = max(each.log.base_std for each in logs)
         return std
 
     def predicted(self, value: Array, formed: FormedLog, half: int) -> tuple[Array, Array]:
@@ -252,6 +258,7 @@ class DynamicsModel:
         friction = value[part("coulomb")] * sign + value[part("viscous")] * speed
         friction = friction + value[part("load")] * load
         whole = drive + self._padded(friction)
+        whole = whole - formed.lifting @ value[part("accelerometer offset")]
         constant = np.exp(value[part("log constant")])
         mean = float(np.exp(value[part("log constant")].sum() / max(1, n)))
         scale = np.full(whole.shape[1], 1.0 / mean) if first else 1.0 / constant
@@ -269,6 +276,7 @@ class DynamicsModel:
             ("viscous", speed, every), ("load", load, every),
         ):  # fmt: skip
             jacobian[:, :, part(kind)] = low(formed.left_of_joints(columns, own, first), age=age)
+        jacobian[:, :, part("accelerometer offset")] = -low(left(formed.lifting), age=age)
         jacobian *= scale[:, None]
         offset, slope = value[part("offset")], scale * low(whole, derivative=True)
         jacobian[:, :, part("age of torques")] = -slope[:, :, None][:, :, : min(n, 1)]

@@ -221,7 +221,8 @@ def _not_told(model: DynamicsModel, fit: FittedDynamics, scaled: bool) -> list[s
     untold = [
         f"{name}: near the description's, for the logs do not tell it"
         for name, found, before in zip(fit.unknowns.names, std, fit.prior_std, strict=True)
-        if found > UNTOLD * before and not name.startswith(("load", "log constant", "offset"))
+        if found > UNTOLD * before
+        and not name.startswith(("load", "log constant", "offset", "accelerometer"))
     ]
     untold += [
         f"friction with load of {model.joints[j]}: left out, for the logs do not tell it from none"

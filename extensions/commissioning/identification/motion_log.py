@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from ....logs.file.reader import RecordedRun
 
 
+IMU_STD, CAPTURE_STD = 0.1, 0.01
+"""To which an IMU and motion capture know the mean of the specific force [m/s^2]."""
+
+
 @dataclass(frozen=True)
 class MotionLog:
     """The measurements of one run on an even grid, one row a sample. What was not measured is None.
@@ -30,6 +34,7 @@ class MotionLog:
         torque: measured at the joints [N m or N], (n, n_joints).
         asked: commanded torques without joint feedback [N m or N], (n, n_joints).
         base: of a floating base, in its axes: rate [rad/s] and specific force at its origin [m/s^2], (n, 6).
+        base_std: to which the mean of that force is known [m/s^2]: an IMU's offset, or motion capture's.
         closed: which contact points touch the ground, (n, n_contacts).
         wrenches: force and moment on each foot about its sole's centre, in its link's axes, (n, n_feet, 6) [N, N m]; no number
             where a part was not measured.
@@ -41,6 +46,7 @@ class MotionLog:
     torque: Array | None = None
     asked: Array | None = None
     base: Array | None = None
+    base_std: float = IMU_STD
     closed: Flags2D | None = None
     wrenches: Array | None = None
 
@@ -90,7 +96,7 @@ def log_of_recording(
     closed = signal(f"{block}.contacts.closed")
     return MotionLog(
         run.path.name, 1.0 / run.header.base_rate, position, measured, asked, base,
-        None if closed is None else closed.astype(bool),
+        closed=None if closed is None else closed.astype(bool),
     )  # fmt: skip
 
 
@@ -136,7 +142,8 @@ def log_of_graph(file: Path, block: str | None = None) -> tuple[MotionLog, Robot
         base = rows.imu if base is None else rows.imu - (rows.imu - base).mean(axis=0)
     closed = rows.closed if params.contacts else None
     log = MotionLog(
-        Path(params.file).name, period, position, torque, played.commanded, base, closed, played.wrenches
+        Path(params.file).name, period, position, torque, played.commanded, base,
+        IMU_STD if params.truth is None else CAPTURE_STD, closed, played.wrenches,
     )  # fmt: skip
     return log, robot
 
