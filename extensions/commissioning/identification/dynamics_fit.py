@@ -421,6 +421,10 @@ def _fitted(model: DynamicsModel, logs: list[MotionLog], band: float) -> FittedD
         value = value + np.linalg.solve(normal, side)
         noise = np.concatenate(errors).std(axis=0) / np.sqrt(share) + 1e-9
     inverse = np.linalg.inv(normal)
+    if model.first:  # many unknowns fit some of the noise of the equations that are left
+        independent = thinned * sum(len(each.torque) for each in formed) * float(share.sum())
+        free = count - float(np.trace(inverse @ known))  # what is not held by the prior
+        middle *= independent / max(independent - free, 0.1 * independent)
     covariance = inverse @ (middle + known) @ inverse.T
     equations = sum(each.torque.size for each in formed)
     return FittedDynamics(model.unknowns, value, covariance, std, noise, band, equations)

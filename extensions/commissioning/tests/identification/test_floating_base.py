@@ -9,11 +9,20 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from aloft import load
 from aloft.extensions.commissioning.identification.base_parameters import LinkRegressor, Motion
-from aloft.extensions.commissioning.identification.dynamics_fit import DynamicsModel, fit_dynamics
+from aloft.extensions.commissioning.identification.dynamics_fit import (
+    MASS_STD,
+    DynamicsModel,
+    FittedDynamics,
+    fit_dynamics,
+)
+from aloft.extensions.commissioning.identification.dynamics_report import identify_dynamics
 from aloft.extensions.commissioning.identification.ground_forces import equations_left
 from aloft.extensions.commissioning.identification.identification import IdentificationError
 from aloft.extensions.commissioning.identification.motion_log import MotionLog, missing
+from aloft.hal.log.played_log import rotation_of
+from aloft.lab.studies.identified_robots import NINETY
 from aloft.robots.description import find_robot
 from aloft.robots.pinocchio_model import build_pinocchio_model
 
@@ -77,6 +86,92 @@ def test_what_is_left_of_the_equations_does_not_depend_on_forces_that_are_not_me
     free = sum({1: 3, 2: 5}[p] - (measured == "normal") for p in loads)
     rank = np.linalg.matrix_rank(through[0], tol=1e-9)
     assert rank == count - (0 if measured == "wrench" else min(free, count))
+
+
+@pytest.fixture(scope="module")
+def swayed(tmp_path_factory):
+    """What a robot measures that sways over its feet with the standard trial's sensors, with the wrenches of its feet as MuJoCo has them,
+    and a description of it that is wrong by a fifth."""
+    file = tmp_path_factory.mktemp("sway") / "sway.yaml"
+    file.write_text("include: [aloft:sway, aloft:trials/standard]\n")
+    result = load(file).run()
+    result.raise_if_failed()
+
+    def signal(name: str) -> np.ndarray:
+        return np.asarray(result.signal(f"robot.{name}"))
+
+    def middle(values: np.ndarray) -> np.ndarray:
+        return 0.5 * (values + np.concatenate([values[1:], values[-1:]]))
+
+    angles, built = signal("joints.position"), build_pinocchio_model(BRUCE)
+    turns, places = rotation_of(signal("truth.base_orientation")), signal("truth.base_position")
+    forces, points = middle(signal("truth.contact_force")), signal("truth.contact_position")
+    wrenches, data = np.zeros((len(angles), len(BRUCE.feet), 6)), built.model.createData()
+    for k, q in enumerate(angles):
+        pin.framesForwardKinematics(built.model, data, np.concatenate([np.zeros(6), [1.0], q]))
+        for point, foot in enumerate(BRUCE.foot_of_contact()):
+            sole = data.oMf[built.sole_frames[foot]]
+            turn = turns[k] @ sole.rotation
+            arm = turn.T @ (points[k, point] - places[k] - turns[k] @ sole.translation)
+            force = turn.T @ forces[k, point]
+            wrenches[k, foot] += np.concatenate([force, np.cross(arm, force)])
+    base = np.hstack([signal("imu.angular_velocity"), middle(signal("imu.specific_force"))])
+    log = MotionLog(
+        "sway", 0.002, angles, signal("joints.torque"), None, base,
+        closed=signal("contacts.closed").astype(bool), wrenches=wrenches,
+    )  # fmt: skip
+    rng, links = np.random.default_rng(0), []
+    for link in BRUCE.links:
+        mass, size = np.exp(0.2 * rng.normal(size=2))
+        links.append(link.model_copy(update={
+            "mass": link.mass * mass, "com": tuple(np.array(link.com) + 0.01 * rng.normal(size=3)),
+            "inertia": tuple(np.array(link.inertia) * mass * size),
+        }))  # fmt: skip
+    return log, BRUCE.changed(links=tuple(links))
+
+
+def judged(model: DynamicsModel, fit: FittedDynamics) -> tuple[float, float]:
+    """Return the share of 90 % intervals that contain the true base parameters, and the error of the mass [kg]."""
+    part, truth = model.part("base"), LinkRegressor(BRUCE).described_base
+    std, error = np.sqrt(np.diag(fit.covariance))[part], np.abs(fit.value[part] - truth)
+    return float((error < NINETY * std).mean()), float(error[model.links.whole_mass])
+
+
+@pytest.mark.long
+def test_measured_wrenches_tell_masses_without_torques(swayed):
+    log, wrong = swayed
+    found = identify_dynamics(wrong, [replace(log, torque=None)])
+    share, mass = judged(found.model, found.fit)
+    assert share > 0.85
+    assert mass < 0.02 and abs(wrong.total_mass - BRUCE.total_mass) > 0.3
+    names, std = found.fit.unknowns.names, np.sqrt(np.diag(found.fit.covariance))
+    told = {n for n, s, b in zip(names, std, found.fit.prior_std, strict=True) if s < 0.3 * b}
+    assert "whole mass" in told and "torso m x" in " ".join(told)
+    assert len(told) > 40, "of 80"
+    residual = found.residuals[0]
+    assert list(residual.fitted) == found.model.equations and len(residual.fitted) == 6
+    for name, left in residual.fitted.items():
+        assert left < (0.5 if "force" in name else 0.8) * residual.described[name], name
+    assert all(link.mass > 0.0 for link in found.body.links.values())
+    assert any("friction, rotor inertia" in text for text in found.untold)
+    assert any("near the description's" in text for text in found.untold)
+
+
+@pytest.mark.long
+def test_switches_and_torques_tell_friction_and_masses_but_for_a_common_factor(swayed):
+    log, wrong = swayed
+    part = slice(500, 6500)
+    found = identify_dynamics(
+        wrong,
+        [replace(log, wrenches=None, position=log.position[part], torque=log.torque[part],
+                 base=log.base[part], closed=log.closed[part])], band=5.0,
+    )  # fmt: skip
+    share, mass = judged(found.model, found.fit)
+    assert share > 0.85 and mass < 1.0
+    for name, friction in zip(found.model.joints, BRUCE.motors.friction, strict=True):
+        coulomb = found.values("coulomb")[name]
+        assert abs(coulomb.value - friction) < 4.0 * coulomb.std
+    assert any("a common factor on torque constants" in text for text in found.untold)
 
 
 def moving_log(torques: bool, wrenches: bool) -> MotionLog:
@@ -168,13 +263,16 @@ def flight(rng: np.random.Generator, duration: float = 6.0) -> tuple[np.ndarray,
 
 
 def test_a_flight_without_torques_tells_what_the_mass_scales():
-    truth, log = flight(np.random.default_rng(1))
-    model, fit = fit_dynamics(BRUCE, [log])
-    std = np.sqrt(np.diag(fit.covariance))
-    off = np.abs(fit.value - truth) / std
-    print(np.sort(off)[-8:], (off < 1.645).mean(), (std < 0.3 * fit.prior_std).mean())
-    described = np.abs(model.mean - truth) / std
-    print(np.median(described), np.median(off), len(std), fit.band, fit.noise)
+    truth, log = flight(np.random.default_rng(2))
+    model, fit = fit_dynamics(BRUCE, [log], 5.0)
+    part = model.part("base")
+    std, error = np.sqrt(np.diag(fit.covariance))[part], np.abs(fit.value[part] - truth)
+    told = std < 0.1 * fit.prior_std[part]
+    assert told.sum() > 50, "of 80"
+    assert np.median(error[told] / np.abs(model.mean[part] - truth)[told]) < 0.25
+    assert (error < NINETY * std).mean() > 0.85
+    mass = part.start + model.links.whole_mass
+    assert fit.value[mass] == pytest.approx(BRUCE.total_mass, rel=3 * MASS_STD)
 
 
 def test_what_a_log_of_a_floating_base_lacks_is_said():
