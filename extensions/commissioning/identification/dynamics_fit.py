@@ -48,6 +48,8 @@ CONSTANT_STD, LOAD_STD, AGE_STD = 0.1, 0.1, 0.004
 """Standard deviations, beforehand, of torque constants, of friction with load, and of the torques' age [s]."""
 LINK_STD = 1.0
 """That of masses, moments and inertias, relative to the description's sizes."""
+FLOATING_LINK_STD = 0.3
+"""The same of a floating base, whose many links most logs leave open, and many could take up what a log's errors are."""
 ROUNDS = 8
 MASS_STD = 0.002
 """That of the whole mass, relative, where nothing weighs the robot."""
@@ -213,7 +215,8 @@ class DynamicsModel:
         mass = np.maximum(tensors[:, 0], 1e-6)
         size = np.sqrt(np.maximum(tensors[:, [4, 6, 9]].sum(axis=1) / mass, 1e-6))
         powers = np.array([0, *(1,) * 3, *(2,) * 6])
-        links = LINK_STD * (mass[:, None] * size[:, None] ** powers).reshape(-1)
+        relative = FLOATING_LINK_STD if self.first else LINK_STD
+        links = relative * (mass[:, None] * size[:, None] ** powers).reshape(-1)
         self.base_prior = (self.links.lumped * links**2) @ self.links.lumped.T
         if not self.weighed:
             whole = self.links.whole_mass

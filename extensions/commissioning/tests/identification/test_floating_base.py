@@ -268,7 +268,7 @@ def test_a_flight_without_torques_tells_what_the_mass_scales():
     part = model.part("base")
     std, error = np.sqrt(np.diag(fit.covariance))[part], np.abs(fit.value[part] - truth)
     told = std < 0.1 * fit.prior_std[part]
-    assert told.sum() > 50, "of 80"
+    assert told.sum() > 40, "of 80"
     assert np.median(error[told] / np.abs(model.mean[part] - truth)[told]) < 0.25
     assert (error < NINETY * std).mean() > 0.85
     mass = part.start + model.links.whole_mass
