@@ -1,4 +1,4 @@
-"""What the forces of the ground leave of a floating base's equations of motion.
+"""Forces of the ground in a floating base's equations of motion, and what they leave of these.
 
 Each loaded foot adds its wrench, J' w, to the equations; J is its Jacobian at the sole's centre, w is about there in its link's
 axes. A wrench that was measured goes to the known side. Of one that was not, or of which only the normal force was, the directions that its loaded

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 IMU_STD, CAPTURE_STD = 0.1, 0.01
-"""To which an IMU and motion capture know the mean of the specific force [m/s^2]."""
+"""Standard deviations of the mean specific force by an IMU and by motion capture [m/s^2]."""
 
 
 @dataclass(frozen=True)
