@@ -100,7 +100,7 @@ def test_an_icubs_log_gets_its_contacts(tmp_path: Path) -> None:
         "l_sole": "lfForceZ",
         "r_sole": "rfForceZ",
     }
-    assert contacts["l_sole"]["closes"] == "69 N", "a quarter of the weight of 28.3 kg"
+    assert contacts["l_sole"]["closes"] == "81 N", "a quarter of the weight of 33.1 kg"
 
 
 STICK = """<mujoco><worldbody><body name="rod"><joint name="hinge" axis="0 1 0" range="-1 1"/>
