@@ -186,6 +186,23 @@ def moving_log(torques: bool, wrenches: bool) -> MotionLog:
     )  # fmt: skip
 
 
+def test_equations_are_those_of_inverse_dynamics_with_rotors_geared_to_two_joints():
+    coupled = BRUCE.rotor_matrix - np.diag(np.diag(BRUCE.rotor_matrix))
+    assert np.abs(coupled).max() > 1e-4, "a motor of BRUCE moves two joints"
+    model = DynamicsModel(BRUCE)
+    log = moving_log(torques=True, wrenches=False)
+    formed = model.form(replace(log, closed=np.zeros_like(log.closed)), 8.0)
+    made, _ = model.predicted(model.mean, formed, 0)
+    motion, free = formed.motions[0], pin.Model(model.links.model)
+    free.armature = np.zeros(free.nv)
+    data, whole = free.createData(), []
+    for k, turns in enumerate(motion.acceleration):
+        torque = pin.rnea(free, data, *model.links._states(motion, k)).copy()
+        torque[6:] += BRUCE.rotor_matrix @ turns
+        whole.append(torque)
+    assert made == pytest.approx(formed.low(np.array(whole)), abs=1e-6)
+
+
 @pytest.mark.parametrize("torques", [True, False])
 def test_derivatives_by_the_unknowns_are_those_of_the_equations_left(torques):
     model = DynamicsModel(BRUCE, torques)
@@ -303,3 +320,13 @@ def test_standing_without_torques_or_forces_tells_nothing():
         fit_dynamics(BRUCE, [stands], 8.0)
     with pytest.raises(IdentificationError, match="of these logs only sines have torques"):
         fit_dynamics(BRUCE, [replace(log, name="quiet"), moving_log(True, False)], 8.0)
+
+
+def test_too_little_motion_is_refused():
+    rng, log = np.random.default_rng(0), moving_log(torques=False, wrenches=False)
+    still = replace(
+        log, position=1e-4 * rng.normal(size=log.position.shape), base=0.02 * rng.normal(size=log.base.shape),
+        closed=np.zeros_like(log.closed),
+    )  # fmt: skip
+    with pytest.raises(IdentificationError, match="sines has too little motion: it tells no mass"):
+        identify_dynamics(BRUCE, [still], band=14.0)
