@@ -13,11 +13,7 @@ PLACES = {
     "extensions/export/c_library.md": ("export",),
     "docs/compiled.md": ("tick",),
     "docs/frontier.md": ("frontier",),
-    "docs/landing.md": tuple(
-        f"{table}{rise}"
-        for table in ("impulses", "quarters", "directions")
-        for rise in ("", " 12 cm")
-    ),
+    "docs/landing.md": ("quarters", "quarters 12 cm"),
     "docs/planning.md": ("task parameters",),
     "docs/results.md": ("results", "tasks"),
     "docs/robots_results.md": ("tasks",),

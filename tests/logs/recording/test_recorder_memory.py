@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-MOST_GROWTH = 1 << 20
-"""Bytes, of 3,000 flushes. Rerun's index, which a run without an end does without, would take 3 MB for them."""
+MOST_GROWTH = 4 << 20
+"""Bytes, of 9,000 flushes: allocators take and give back 1 MB. Rerun's index, which a run without an end does without, would
+take 9 MB for them."""
 PROGRAM = """
 import json, os, sys
 from dataclasses import replace
@@ -37,14 +38,14 @@ task = RecorderTask(1 << 20, str(path), 0, flush_period=0.0, sync_period=1e9)
 recorder = RecorderProcess(task, ring, os.dup(output.descriptor))
 bus, state = bytes(header.bus.size), bytes(header.state.size)
 seen = []
-for tick in range(9000):  # each tick is flushed by itself, as half a second's are in a run
+for tick in range(15000):  # each tick is flushed by itself, as half a second's are in a run
     if tick % 10 == 0:
         writer.write(KEYFRAME, tick, bus + state)
     writer.write(ROW, tick, bus)
     recorder.take()
-    if tick in (5999, 8999):
+    if tick in (5999, 14999):
         seen.append(memory())
-report = recorder.finish({"success": True, "ticks": 9000})
+report = recorder.finish({"success": True, "ticks": 15000})
 print(json.dumps({"growth": seen[1] - seen[0], "rows": report.rows, "problem": report.problem}))
 """
 
@@ -55,5 +56,5 @@ def test_memory_does_not_grow_with_a_run(tmp_path: Path) -> None:
     command = [sys.executable, "-c", PROGRAM, str(tmp_path / "a.rrd")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
     told = json.loads(done.stdout.splitlines()[-1])
-    assert told["problem"] == "" and told["rows"] == 9000
+    assert told["problem"] == "" and told["rows"] == 15000
     assert told["growth"] < MOST_GROWTH
