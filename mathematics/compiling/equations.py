@@ -203,7 +203,6 @@ class _Rewriter(CarriedArrays):
             return self._assign_in_turn(node)
         if isinstance(node, ast.Assign):
             self._write_out(node)
-        if isinstance(node, ast.Assign):
             if kept is not None and self._is_foreign(
                 node.targets[0], node.value, isinstance(node.targets[0], ast.Subscript)
             ):
