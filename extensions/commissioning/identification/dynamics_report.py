@@ -148,7 +148,7 @@ def _of_position_alone(model: DynamicsModel, logs: list[MotionLog]) -> list[str]
     """Warn of torques that follow from the positions alone: a controller is identified, not the robot."""
     found = []
     for log in logs:
-        if log.torque is None or model.first:
+        if log.torque is None:
             continue
         q = log.position[:: max(1, len(log.position) // 4000)]
         torque = log.torque[:: max(1, len(log.position) // 4000)]

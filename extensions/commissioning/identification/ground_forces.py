@@ -1,9 +1,9 @@
 """Forces of the ground in a floating base's equations of motion, and what they leave of these.
 
-Each loaded foot adds its wrench, J' w, to the equations; J is its Jacobian at the sole's centre, w is about there in its link's
-axes. A wrench that was measured goes to the known side. Of one that was not, or of which only the normal force was, the directions that its loaded
-points can have are projected out: what is left does not depend on them. In flight all equations are left. So are three kinds of
-log one: with force sensors in the feet, of robots that fly, and with contact switches only.
+A loaded foot adds its wrench, J' w: J is its Jacobian at the sole's centre, w is about there, in its link's axes. A measured
+wrench goes to the known side. Of one that was not measured, or only along the normal, the directions that its loaded points
+can have are projected out, so what is left does not depend on them. In flight everything is left. So logs with force sensors
+in the feet, logs of flight and logs with contact switches only are one kind.
 
 Without torques only the first six equations, the base's, hold. A flat foot whose wrench is not measured leaves none of them, a foot on a
 line one, and one on a point three.
@@ -18,7 +18,7 @@ from ....robots.robot_description import RobotDescription
 from .band import cutoff_of, step_of
 from .base_parameters import LinkRegressor
 from .motion_log import MotionLog
-from .sensor_identification import smooth
+from .sensor_identification import cross_matrices, smooth
 
 NEGLIGIBLE = 1e-6
 """Directions of the ground's forces this much weaker than the strongest are none."""
@@ -89,7 +89,7 @@ class _FootSpans:
         places = [place for index, place in self.of_foot[foot] if loaded[index]]
         if not places:
             return np.zeros((6, 0)), np.zeros(6)
-        span = np.hstack([np.vstack([np.eye(3), _cross(place)]) for place in places])
+        span = np.hstack([np.vstack([np.eye(3), cross_matrices(place)]) for place in places])
         if not np.isfinite(measured[2]):
             return span, np.zeros(6)
         x, y, _ = np.mean(places, axis=0)
@@ -97,11 +97,6 @@ class _FootSpans:
         # forces of the points whose sum has no normal part
         rest = np.linalg.svd(span[2:3])[2][1:].T
         return span @ rest, wrench
-
-
-def _cross(place: Array) -> Array:
-    x, y, z = place.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _widened(closed: Flags2D, near: int) -> Flags2D:

@@ -172,6 +172,19 @@ def test_switches_and_torques_tell_friction_and_masses_but_for_a_common_factor(s
         coulomb = found.values("coulomb")[name]
         assert abs(coulomb.value - friction) < 4.0 * coulomb.std
     assert any("a common factor on torque constants" in text for text in found.untold)
+    assert not any("positions alone" in text for text in found.warnings)
+
+
+@pytest.mark.long
+def test_gains_on_positions_alone_are_told_from_a_robot(swayed):
+    log, wrong = swayed
+    part = slice(500, 3500)
+    angles = log.position[part]
+    held = replace(log, wrenches=None, position=angles, torque=-20.0 * (angles - angles.mean(axis=0)),
+                   base=log.base[part], closed=log.closed[part])  # fmt: skip
+    found = identify_dynamics(wrong, [held], band=5.0)
+    told = [text for text in found.warnings if "a controller is identified, not the robot" in text]
+    assert len(told) == len(found.model.joints)
 
 
 def moving_log(torques: bool, wrenches: bool) -> MotionLog:
