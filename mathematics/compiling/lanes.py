@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
+from .kernel_call import aligned_zeros
 from .machine_code import ENTRY, MachineCode, machine_code_of
 
 WIDTH = 8
@@ -93,7 +94,7 @@ class Lanes:
         self.inputs = [np.zeros((lanes, size)) for size in inputs]
         self.outputs = [np.zeros((lanes, size)) for size in outputs]
         # zeros, because lanes that only fill the last vector up are computed as well
-        self._slots = np.zeros((program.slots, WIDTH * vectors))
+        self._slots = aligned_zeros((program.slots, WIDTH * vectors))
         self._program = program
         self._places = [
             np.array([(each.ctypes.data, each.shape[1]) for each in arrays], np.int64)
