@@ -2,7 +2,6 @@
 
 import csv
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +10,7 @@ import pytest
 
 import aloft.logs
 
-Call = Callable[..., Any]
-CallJson = Callable[..., dict[str, Any]]
+from .conftest import Call, CallJson
 
 
 @pytest.fixture
