@@ -98,7 +98,7 @@ class Corrector:
             )
             held |= touched
             if not self._factorised[0]:
-                self._constraints.differentiate(self._variables)
+                self._constraints.differentiate()
             self._count[0] = held.sum()
             self._place[:] = np.where(held, np.cumsum(held) - 1, -1)
             self._vector[: self._count[0]] = np.where(below > above, below, -above)[held]
