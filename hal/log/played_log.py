@@ -78,6 +78,9 @@ class PlayedLog:
     joint_repeats: float = 0.0
     commanded: Array2D | None = None
     """Commanded torques at the ticks (n, n_joints) [N m], for identification."""
+    wrenches: Array | None = None
+    """Force and moment on each foot about its sole's centre, in its link's axes, at the ticks (n, n_feet, 6) [N, N m], for
+    identification; no number where it was not measured."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +160,7 @@ def play(log: LogFile, params: LogParameters, robot: RobotDescription, period: f
         gyro = player.take(imu.angular_velocity, 3, "rad/s", "imu.angular_velocity")
         force = player.take(imu.specific_force, 3, "m/s^2", "imu.specific_force")
     columns, (*joints, commanded) = _joints(player, names)
-    contacts = _contacts(player)
+    contacts, forces = _contacts(player)
     truth = params.truth
     place = turn = None
     if truth is not None:
@@ -195,6 +198,11 @@ def play(log: LogFile, params: LogParameters, robot: RobotDescription, period: f
     played.count, played.rate = len(longest.stamps), float(1.0 / np.mean(steps))
     played.gaps = int((steps > GAP * np.median(steps)).sum())
     played.rows = _rows(player, gyro, force, mounting, columns, joints, contacts, place, turn)
+    if forces:
+        played.wrenches = np.full((count, len(robot.feet), 6), np.nan)
+        for index, series in forces.items():
+            own = [2] if series.values.shape[1] == 1 else range(6)
+            played.wrenches[:, index, own] = player.on_ticks(series)
     if commanded is not None:
         rows = player.joint_rows(commanded, columns, np.zeros(len(columns)))
         played.commanded = rows._replace(
@@ -245,10 +253,11 @@ def _joints(player: _Player, names: Sequence[str]) -> tuple[list[int], tuple[_Se
     )
 
 
-def _contacts(player: _Player) -> dict[int, _Series]:
-    """Return by foot the flags of its contact."""
+def _contacts(player: _Player) -> tuple[dict[int, _Series], dict[int, _Series]]:
+    """Return by foot the flags of its contact, and its force or wrench where that was measured."""
     feet = [foot.name for foot in player.robot.feet]
     found: dict[int, _Series] = {}
+    forces: dict[int, _Series] = {}
     for name, given in player.params.contacts.items():
         if name not in feet:
             near = get_close_matches(name, feet, 1, 0.3)
@@ -276,14 +285,23 @@ def _contacts(player: _Player) -> dict[int, _Series]:
                     found=f"{given.opens:g} N",
                 )
             )
-        unit = "N" if given.force is not None else ""
-        series = player.take(given.force or given.closed, 1, unit, f"contacts.{name}")
-        if series is not None:
+        # a list of six has columns in N and in N m
+        unit = "" if given.force is None or isinstance(given.force, list) else "N"
+        columns, count = given.force or given.closed, None if given.force else 1
+        series = player.take(columns, count, unit, f"contacts.{name}")
+        if series is not None and (width := series.values.shape[1]) not in (1, 6):
+            problem = (
+                f"{columns} has {width} columns, expected 1, a force, or 6, a force and a moment"
+            )
+            player.played.problems.append(LogProblem(problem, f"contacts.{name}"))
+        elif series is not None:
             flags = series.values[:, 0] != 0.0
             if given.force is not None:
-                flags = with_hysteresis(series.values[:, 0], given.closes, given.opens)
+                forces[feet.index(name)] = series
+                normal = series.values[:, 2 if width == 6 else 0]
+                flags = with_hysteresis(normal, given.closes, given.opens)
             found[feet.index(name)] = _Series(series.stamps, flags[:, None].astype(np.float64))
-    return found
+    return found, forces
 
 
 def _mounting(player: _Player) -> tuple[str, Array, Array] | None:
