@@ -5,14 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 import yaml
 
+from ..mathematics.constants import GRAVITY
 from ..runtime.language.errors import AloftError
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_json, say, table
+
+if TYPE_CHECKING:
+    from ..robots.robot_description import RobotDescription
 
 _WORDS: Mapping[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
     "time": (("stamp", "time"), (1,)),
@@ -35,6 +39,12 @@ _WORDS: Mapping[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
 _LIKELY = ("meas", "actual", "fbk", "feedback")
 _UNLIKELY = ("des", "ref", "cmd", "command", "target", "setpoint", "filt", "fric", "err", "con")
 """Words of what was measured, and of what was wanted or computed: no sensor."""
+_FORCE = re.compile(r"(force|grf)_?z?$|fz$", re.IGNORECASE)
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+")
+_SIDES = {"l": "left", "lf": "left", "left": "left", "r": "right", "rf": "right", "right": "right"}
+"""Names of a force along a sole's normal, their words, and the words of a side."""
+_CLOSES, _OPENS = 0.25, 0.2
+"""Shares of the weight above which a foot's contact is closed, and below which it is opened."""
 _NUMBERED = re.compile(r"(?P<stem>.*?)[_\[]?(?P<number>\d+)\]?(?P<rest>\D*)")
 
 Guess = str | list[str]
@@ -61,12 +71,25 @@ def import_log(
         except LogError as error:
             raise AloftError(str(error)) from None
         widths = {name: each.values.shape[1] for name, each in found.arrays.items()}
-        guessed = guess(widths, joints_of(robot))
+        described = described_robot(robot)
+        guessed = guess(widths, None if described is None else len(described.joints))
+        forces = {} if described is None else forces_of_feet(widths, described)
         target = out or file.with_suffix(".yaml")
         if target.exists() and not force:
             raise AloftError(f"{target} exists; --force overwrites it, --out names another")
         own_stamps = any(each.stamps is not None for each in found.arrays.values())
         graph = graph_of(file, robot, guessed, own_stamps)
+        if described is not None and forces:
+            weight = GRAVITY * described.total_mass
+            graph["blocks"]["robot"]["with"]["contacts"] = {
+                foot: {
+                    "force": column,
+                    "closes": f"{_CLOSES * weight:.0f} N",
+                    "opens": f"{_OPENS * weight:.0f} N",
+                }
+                for foot, column in forces.items()
+            }
+        guessed |= {f"force of {foot}": column for foot, column in forces.items()}
         head = "# Guessed by `aloft log import` from names and widths: look at each column, unit and foot.\n"
         target.write_text(head + yaml.safe_dump(graph, sort_keys=False), encoding="utf-8")
     if as_json:
@@ -85,13 +108,32 @@ def import_log(
     say(console(), f"wrote {target}: look at each part, then `aloft check {target}`")
 
 
-def joints_of(robot: Path | None) -> int | None:
-    """Return how many joints a robot has; ``None`` without one. Raises ``AloftError``."""
+def described_robot(robot: Path | None) -> RobotDescription | None:
+    """Return a robot's description; ``None`` without one. Raises ``AloftError``."""
     if robot is None:
         return None
     from ..robots.description import find_robot
 
-    return len(find_robot(str(robot)).joints)
+    return find_robot(str(robot))
+
+
+def forces_of_feet(widths: Mapping[str, int], robot: RobotDescription) -> dict[str, str]:
+    """Guess the column of the force on each foot, by the sides in both names, where each has one on that side."""
+    found: dict[str, str] = {}
+    for side in ("left", "right"):
+        feet = [foot.name for foot in robot.feet if _side(foot.name) == side]
+        columns = [
+            name for name, width in widths.items()
+            if width == 1 and _FORCE.search(name) and _side(name) == side
+        ]  # fmt: skip
+        if len(feet) == len(columns) == 1:
+            found[feet[0]] = columns[0]
+    return found
+
+
+def _side(name: str) -> str | None:
+    words = (word.lower() for word in _WORD.findall(name))
+    return next((_SIDES[word] for word in words if word in _SIDES), None)
 
 
 def guess(widths: Mapping[str, int], joints: int | None = None) -> dict[str, Guess]:

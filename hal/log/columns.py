@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -80,13 +80,16 @@ class Moments(NamedTuple):
     shift: float = 0.0
 
 
+Units = str | Sequence[str] | Mapping[int, Sequence[str]]
+"""A unit of all columns, one of each, or those of each by how many columns there are."""
+
+
 def numbers(
-    log: LogFile, columns: Columns, units: str | Sequence[str], count: int | None = None
+    log: LogFile, columns: Columns, units: Units, count: int | None = None
 ) -> tuple[Array, Array1D | None]:
     """Return the numbers (n, k) of columns, and their own stamps (n,) [s] if the file has some.
 
     Args:
-        units: of all columns, or of each.
         count: how many columns there must be, if ``units`` does not tell.
 
     Raises:
@@ -109,22 +112,25 @@ def numbers(
         else np.concatenate([each.values for each in found], axis=1)
     )
     width = values.shape[1]
-    expected = count if isinstance(units, str) else len(units)
-    if expected is not None and width != expected:
+    if isinstance(units, str):
+        units = [units] * (width if count is None else count)
+    by_width = units if isinstance(units, Mapping) else {len(units): units}
+    if width not in by_width:
+        expected = " or ".join(map(str, by_width))
         raise LogError(f"{', '.join(names)} has {width} columns, expected {expected}")
     for what, given in (("scale", spec.scale), ("offset", spec.offset)):
         if len(given) not in (1, width):
             raise LogError(
                 f"{what} of {', '.join(names)} has {len(given)} numbers, expected 1 or {width}"
             )
-    wanted = [units] * width if isinstance(units, str) else units
     said = [
         (name, each.unit)
         for name, each in zip(names, found, strict=True)
         for _ in range(each.values.shape[1])
     ]
     factors = [
-        _factor(spec.unit, unit, to, name) for (name, unit), to in zip(said, wanted, strict=True)
+        _factor(spec.unit, unit, to, name)
+        for (name, unit), to in zip(said, by_width[width], strict=True)
     ]
     if any(spec.offset) or {*spec.scale, *factors} != {1.0}:
         values = (values - np.array(spec.offset)) * np.array(spec.scale) * np.array(factors)

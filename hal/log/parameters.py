@@ -50,7 +50,11 @@ class LogJoints(Parameters):
 class LogContact(Parameters):
     """The columns of one foot's contact."""
 
-    force: Columns | None = parameter(None, text="a column of the vertical force [N]")
+    force: Columns | None = parameter(
+        None,
+        text="a column of the force on the foot along its sole's normal [N], or six: force and moment [N, N m] on it about the "
+        "sole's centre, in its link's axes",
+    )
     closes: float = parameter(20.0, unit="N", text="force above which the switches close")
     opens: float = parameter(10.0, unit="N", text="force below which they open")
     closed: Columns | None = parameter(

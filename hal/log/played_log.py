@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 from typing import Any
@@ -13,7 +13,9 @@ from ...mathematics.arrays import Array, Array1D, Flags
 from ...robots.description import RobotDescription
 from .columns import (
     LATE,
+    LogColumns,
     TimedRows,
+    Units,
     at_times,
     last_rows,
     match_joints,
@@ -53,7 +55,7 @@ class _Player:
             self.played.problems.append(LogProblem(str(error), parameter))
 
     def take(
-        self, columns: Any, units: str | Sequence[str], parameter: str, count: int | None = None
+        self, columns: Any, units: Units, parameter: str, count: int | None = None
     ) -> Series | None:
         """Return columns with their times, or nothing where something is wrong with them."""
         if columns is None:
@@ -114,7 +116,7 @@ def play(log: LogFile, params: LogParameters, robot: RobotDescription, period: f
         gyro = player.take(imu.angular_velocity, "rad/s", "imu.angular_velocity", 3)
         force = player.take(imu.specific_force, "m/s^2", "imu.specific_force", 3)
     columns, (*joints, commanded) = _joints(player, names)
-    contacts = _contacts(player)
+    contacts, forces = _contacts(player)
     truth = params.truth
     place = turn = None
     if truth is not None:
@@ -168,6 +170,11 @@ def play(log: LogFile, params: LogParameters, robot: RobotDescription, period: f
     played.count, played.rate = len(longest.stamps), float(1.0 / np.mean(np.diff(longest.stamps)))
     played.gaps = max(int(series.gaps().sum()) for series in player.taken)
     played.rows = _rows(player, gyro, force, mounting, columns, joints, contacts, place, turn)
+    if forces:
+        played.wrenches = np.full((count, len(robot.feet), 6), np.nan)
+        for index, series in forces.items():
+            own = [2] if series.values.shape[1] == 1 else range(6)
+            played.wrenches[:, index, own] = player.on_ticks(series)
     if commanded is not None:
         rows = player.joint_rows(commanded, columns, np.zeros(len(columns)))
         played.commanded = rows._replace(
@@ -228,10 +235,11 @@ def _joints(player: _Player, names: Sequence[str]) -> tuple[list[int], tuple[Ser
     )
 
 
-def _contacts(player: _Player) -> dict[int, Series]:
-    """Return by foot the flags of its contact."""
+def _contacts(player: _Player) -> tuple[dict[int, Series], dict[int, Series]]:
+    """Return by foot the flags of its contact, and its force or wrench where that was measured."""
     feet = [foot.name for foot in player.robot.feet]
     found: dict[int, Series] = {}
+    forces: dict[int, Series] = {}
     for name, given in player.params.contacts.items():
         if name not in feet:
             near = get_close_matches(name, feet, 1, 0.3)
@@ -259,14 +267,20 @@ def _contacts(player: _Player) -> dict[int, Series]:
                     found=f"{given.opens:g} N",
                 )
             )
-        unit = "N" if given.force is not None else ""
-        series = player.take(given.force or given.closed, unit, f"contacts.{name}", 1)
+        columns = given.closed if given.force is None else given.force
+        units: Mapping[int, Sequence[str]] = {1: [""]}
+        if given.force is not None:
+            told = isinstance(columns, LogColumns) and columns.unit is not None  # of all six alike
+            units = {1: ["N"], 6: ["N"] * 6 if told else ["N"] * 3 + ["N m"] * 3}
+        series = player.take(columns, units, f"contacts.{name}")
         if series is not None:
             flags = series.values[:, 0] != 0.0
             if given.force is not None:
-                flags = with_hysteresis(series.values[:, 0], given.closes, given.opens)
+                forces[feet.index(name)] = series
+                normal = series.values[:, 2 if series.values.shape[1] == 6 else 0]
+                flags = with_hysteresis(normal, given.closes, given.opens)
             found[feet.index(name)] = Series(series.stamps, flags[:, None].astype(np.float64))
-    return found
+    return found, forces
 
 
 def _mounting(player: _Player) -> tuple[str, Array, Array] | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from ...mathematics.arrays import Array1D, Array2D, Flags1D, Flags2D
+from ...mathematics.arrays import Array, Array1D, Array2D, Flags1D, Flags2D
 from .columns import TimedRows
 
 
@@ -53,3 +53,6 @@ class PlayedLog:
     joint_repeats: float = 0.0
     commanded: Array2D | None = None
     """Commanded torques at the ticks (n, n_joints) [N m], for identification."""
+    wrenches: Array | None = None
+    """Force and moment on each foot about its sole's centre, in its link's axes, at the ticks (n, n_feet, 6) [N, N m], for
+    identification; no number where it was not measured."""

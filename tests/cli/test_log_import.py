@@ -5,9 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import yaml
 
-from aloft.cli.log_import import graph_of, guess, numbered
+from aloft.cli.log_import import forces_of_feet, graph_of, guess, numbered
+from aloft.lab.studies.icub_estimators import write_robot
+from aloft.robots.description import find_robot
+from aloft.robots.robot_description import Foot
 from aloft.runtime.loading import LoadError, checked_file
+
+from ..shared_data import FOLDER, needs_icub
+from .conftest import run_for_json
 
 PENDULUM = [
     "time", "pos_meas1", "pos_meas2", "pos_filt1", "pos_filt2", "pos_des1", "pos_des2",
@@ -53,6 +60,47 @@ def test_measured_columns_come_before_wanted_ones_whatever_their_order() -> None
 )
 def test_columns_that_count_up(names: list[str], series: dict[str, list[str]]) -> None:
     assert numbered(dict.fromkeys(names, 1)) == series
+
+
+@pytest.mark.parametrize(
+    ("columns", "feet", "found"),
+    [
+        (["lfForceZ", "rfForceZ", "lfPos"], ["r_sole", "l_sole"], {"l_sole": "lfForceZ", "r_sole": "rfForceZ"}),
+        (["left_foot_fz", "left_foot_fx"], ["left_foot", "right_foot"], {"left_foot": "left_foot_fz"}),
+        (["lfForceZ"], ["l_foot_front", "l_foot_rear"], {}),  # which of both is not known
+        (["lfForceZ", "leftForce"], ["l_sole"], {}),
+        (["force", "reforce"], ["l_sole", "r_sole"], {}),  # of no side
+    ],
+)  # fmt: skip
+def test_forces_go_to_the_foot_of_their_side(
+    columns: list[str], feet: list[str], found: dict[str, str]
+) -> None:
+    robot = find_robot("bruce")
+    robot = robot.changed(feet=tuple(Foot(name=f, link=robot.base, sole=(0, 0, 0)) for f in feet))
+    assert forces_of_feet(dict.fromkeys(columns, 1), robot) == found
+    assert not forces_of_feet(dict.fromkeys(columns, 3), robot), "a vector is no normal force"
+
+
+@needs_icub
+def test_an_icubs_log_gets_its_contacts(tmp_path: Path) -> None:
+    robot, out = write_robot(tmp_path), tmp_path / "walk.yaml"
+    done = run_for_json(
+        "log",
+        "import",
+        str(FOLDER / "icub" / "walking.mat"),
+        "--robot",
+        str(robot),
+        "--out",
+        str(out),
+    )
+    assert done["guessed"]["force of l_sole"] == "lfForceZ"
+    graph = yaml.safe_load(out.read_text())
+    contacts = graph["blocks"]["robot"]["with"]["contacts"]
+    assert {foot: each["force"] for foot, each in contacts.items()} == {
+        "l_sole": "lfForceZ",
+        "r_sole": "rfForceZ",
+    }
+    assert contacts["l_sole"]["closes"] == "81 N", "a quarter of the weight of 33.1 kg"
 
 
 STICK = """<mujoco><worldbody><body name="rod"><joint name="hinge" axis="0 1 0" range="-1 1"/>
