@@ -15,6 +15,7 @@ import numpy as np
 
 from ...files.pip_line import pip_line
 from ...mathematics.arrays import Array
+from .matlab_texts import matlab_texts
 
 MOST_BYTES = 8_000_000_000
 """Numbers of a log in memory; a larger one is refused before they are read."""
@@ -139,6 +140,7 @@ def _read_hdf5(path: Path) -> LogFile:
                 f"{path.name} is no HDF5 file; MATLAB writes one with save(..., '-v7.3')"
             )
     found: dict[str, Any] = {}
+    texts: dict[str, list[str]] = {}
     size = 0
     with h5py.File(path, "r") as file:
 
@@ -150,13 +152,15 @@ def _read_hdf5(path: Path) -> LogFile:
             size += item.nbytes
             if size > MOST_BYTES:
                 raise LogError(f"{path.name} has more than {MOST_BYTES / 1e9:g} GB of numbers")
-            if item.dtype.kind in "fiub" and item.ndim in (1, 2) and item.size > 1:
+            if (named := matlab_texts(file, item)) is not None:
+                texts[name] = named
+            elif item.dtype.kind in "fiub" and item.ndim in (1, 2) and item.size > 1:
                 found[name] = item[()]
             elif h5py.check_string_dtype(item.dtype) is not None and item.ndim == 1:
                 found[name] = np.array([text.decode() for text in item[()]])
 
         file.visititems(visit)
-    return _fill(LogFile(path), found)
+    return _fill(LogFile(path, texts=texts), found)
 
 
 def _read_npz(path: Path) -> LogFile:

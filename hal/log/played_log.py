@@ -29,6 +29,8 @@ from .link_motion import imu_at_base, link_motion
 from .log_file import LogError, LogFile
 from .parameters import LogParameters
 
+UNNAMED = "?"
+"""In place of a column's name: its joint is not known yet, and the log is not played."""
 MANY_REPEATS = 0.02
 """A share of samples that repeat the one before, above which there is a warning."""
 GAP = 5.0
@@ -225,6 +227,17 @@ def _joints(player: _Player, names: Sequence[str]) -> tuple[list[int], tuple[_Se
             player.played.problems.append(LogProblem(problem, "joints.names"))
     elif given.names is not None:
         listed = given.names
+    if UNNAMED in listed:
+        at = ", ".join(str(k) for k, name in enumerate(listed) if name == UNNAMED)
+        player.played.problems.append(
+            LogProblem(
+                f"columns {at} (the first is 0) have no joint's name yet",
+                "joints.names",
+                found=UNNAMED,
+                expected="the names of all columns in their order, as the driver's documentation has them",
+                fix=f"a joint of {player.robot.name}, or - for a column that is none",
+            )
+        )
     columns, unknown = match_joints(list(listed), list(names))
     for name in unknown:
         near = get_close_matches(name, names, 1, 0.5)
