@@ -175,12 +175,16 @@ def _beside(graph: Path, file: Path) -> Path:
 
 def _arrivals(log: LogFile, played: dict[str, Any]) -> list[str]:
     """Take stamps whose steps vary much for arrival times, and say so."""
-    from ..hal.log.columns import MOST_JITTER, LogClock, jitter_of
+    from ..hal.log.columns import MOST_JITTER, LogClock, moments_of
+    from ..hal.log.log_file import LogError
 
     if "clock" not in played:
         return []
     rows = len(log.array(played["clock"]["stamps"]).values)
-    jitter = jitter_of(log, LogClock.model_validate(played["clock"]), rows, None)
+    try:
+        jitter = moments_of(log, LogClock.model_validate(played["clock"]), rows, None).jitter
+    except LogError as error:
+        return [str(error)]
     if jitter <= MOST_JITTER:
         return []
     played["clock"]["even"] = True

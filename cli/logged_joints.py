@@ -242,16 +242,27 @@ def _motions(
     log: LogFile, played: Mapping[str, Any], robot: RobotDescription
 ) -> dict[str, LoggedMotion]:
     """Return the columns' motion by what tells the base's: `truth`, each place that an IMU may have, or only the feet (empty)."""
-    from ..hal.log.columns import LogClock, at_times, numbers, stamps_of
+    from ..hal.log.columns import LogClock, at_times, moments_of, numbers, rows_to_keep
     from ..hal.log.log_file import LogError
     from ..hal.log.parameters import LogParameters
-    from ..hal.log.played_log import play, rotation_of
+    from ..hal.log.played_log import play
     from ..hal.log.standing_feet import LoggedMotion
+    from ..hal.log.turns import rotation_of
 
     joints = played["joints"]
-    raw, own = numbers(log, joints["position"], None, "rad")
+    raw, own = numbers(log, joints["position"], "rad")
+    kinds = raw, numbers(log, joints["velocity"], "rad/s")[0] if "velocity" in joints else raw
     still = LoggedMotion(raw, np.zeros_like(raw), np.zeros((len(raw), len(robot.feet)), bool))
+    try:
+        moments = moments_of(log, LogClock.model_validate(played.get("clock", {})), len(raw), own)
+    except LogError:
+        return {"": still}
+    both = np.hstack(kinds) if moments.order is None else np.hstack(kinds)[moments.order]
+    keep = rows_to_keep(moments.times, both)[0]
+    stamps, both = moments.times[keep], both[keep]
     whole = {part: each for part, each in played.items() if part != "joints"}
+    if len(stamps) > 1 and stamps[-1] - stamps[0] > LONGEST:
+        whole["end"] = LONGEST
     places: dict[str, Any] = {"": None}
     if "imu" in played:
         mounted = [
@@ -264,19 +275,12 @@ def _motions(
         }
     found: dict[str, LoggedMotion] = {}
     for place, imu in places.items():
-        settings = whole | {"imu": imu, "end": LONGEST}
-        rows = play(log, LogParameters.model_validate(settings), robot, PERIOD).rows
+        settings = LogParameters.model_validate(whole | {"imu": imu})
+        rows = play(log, settings, robot, PERIOD).rows
         if rows is None:
             continue
-        times = rows.position.times
-        try:
-            stamps = stamps_of(log, LogClock.model_validate(played.get("clock", {})), len(raw), own)
-        except LogError:
-            break
-        position = at_times(stamps, raw, times)
-        if "velocity" in joints:
-            speeds = at_times(stamps, numbers(log, joints["velocity"], None, "rad/s")[0], times)
-        else:
+        position, speeds = np.hsplit(at_times(stamps, both, rows.position.times), 2)
+        if "velocity" not in joints:
             speeds = np.gradient(position, PERIOD, axis=0)
         moving = position, _mean(speeds, SMOOTH), _steady(rows.closed, robot)
         turn = rotation_of(rows.pose[:, 3:])

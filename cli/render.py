@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from ..runtime.language.errors import AloftError
-from .plot import overlaid, panels_of
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_json, progress_bar, say
+from .shared.run_panels import run_panels
 from .shared.viewing import read
 
 
@@ -82,11 +82,7 @@ def render(
         camera = Camera(width, height, azimuth, elevation, distance, follow, not no_forces, overlay)
         runs = [read(file) for file in recordings]
         takes = [Take(run, name, camera) for run, name in zip(runs, names, strict=True)]
-        panels = [
-            panel
-            for signal in plots or []
-            for panel in overlaid([panels_of(run, signal, start, end) for run in runs], names)
-        ]
+        panels = run_panels(runs, names, plots or [], start, end)
         first, last = (start, end) if at is None else (at, at)
         times = instants(takes, first, last, speed / rate)
         out = console()

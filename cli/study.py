@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.options import Cluster, JsonBesideTables, Workers
+from .shared.options import Cluster, JsonBesideTables, StudySeeds, Workers
 from .shared.output import console, errors_reported, print_json, print_warning, say
 from .shared.studies import (
     check_cells,
@@ -37,9 +37,7 @@ def study(
     file: Annotated[
         Path, typer.Argument(help="The study file; or 'paper': redraw the paper's figures.")
     ],
-    seeds: Annotated[
-        str, typer.Option(help="Seeds in place of the study's: 0:4 for a quick look.")
-    ] = "",
+    seeds: StudySeeds = "",
     where: Annotated[
         list[str] | None,
         typer.Option(help="Only part of the grid: axis=value, task=..., arm=... Repeatable."),

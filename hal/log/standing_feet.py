@@ -13,7 +13,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array, Flags1D, Flags2D
 from ...robots.robot_description import RobotDescription
-from .played_log import rotation_of
+from .turns import rotation_of
 
 RATE, SPEED, TILT, HEIGHT = 0.1, 0.05, 0.06, 0.02
 """What a standing foot of a real leg has, with its encoders' offsets: rad/s, m/s, rad and m."""

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
+from .kernel_call import aligned_zeros
 from .machine_code import ENTRY, MachineCode, machine_code_of
 
 WIDTH = 8
@@ -80,20 +81,26 @@ class Lanes:
     Args:
         program: the program.
         lanes: how many sets of inputs there are.
-        inputs, outputs: the numbers of entries of each.
+        inputs, outputs: the numbers of entries of each, or memory for the entries of all lanes.
 
     Attributes:
         inputs, outputs: of each (lanes, entries).
     """
 
     def __init__(
-        self, program: Program, lanes: int, inputs: Sequence[int], outputs: Sequence[int]
-    ) -> None:
+        self, program: Program, lanes: int,
+        inputs: Sequence[int | Array], outputs: Sequence[int | Array],
+    ) -> None:  # fmt: skip
         vectors = -(-lanes // WIDTH)
-        self.inputs = [np.zeros((lanes, size)) for size in inputs]
-        self.outputs = [np.zeros((lanes, size)) for size in outputs]
+        self.inputs, self.outputs = (
+            [
+                np.zeros((lanes, each)) if isinstance(each, int) else each.reshape(lanes, -1)
+                for each in entries
+            ]
+            for entries in (inputs, outputs)
+        )
         # zeros, because lanes that only fill the last vector up are computed as well
-        self._slots = np.zeros((program.slots, WIDTH * vectors))
+        self._slots = aligned_zeros((program.slots, WIDTH * vectors))
         self._program = program
         self._places = [
             np.array([(each.ctypes.data, each.shape[1]) for each in arrays], np.int64)

@@ -423,9 +423,14 @@ class LockstepCoordinator(Block):
         """Say that the actuators here are in damping, wait until the others' are, and disconnect."""
         if self._opened:
             try:
-                self.peers.wait_for_rest(REST_TIMEOUT, self.context.clock.tick)
+                tick = self.context.clock.tick
+                self.peers.wait_for_rest(REST_TIMEOUT, tick, alone=self._ends_alone())
             finally:
                 self._links.transport.close()
+
+    def _ends_alone(self) -> bool:
+        """Return whether the others go on after this part's end."""
+        return False
 
 
 class FaultReporter(Sink):
@@ -469,9 +474,11 @@ BEACON_PERIOD = 0.5
 class FreeRunningCoordinator(LockstepCoordinator):
     """Starts the parts together, as in lockstep, and then lets each keep its own time.
 
-    A tick waits for nobody. A part whose run ends in order ends the others too, and so does a
-    fault. One that is gone does not: the policies of its links for late messages hold, and it
-    may come back. Beacons during the run are sent by a thread of their own.
+    A tick waits for nobody. A part whose run ends in order ends the others too, as no robot may run on
+    without its controller, nor a controller on measurements that stand still; and so does a fault.
+    Only a part that has run its whole length and sends the others nothing ends alone. One that is gone
+    ends nobody: the policies of its links for late messages hold, and it may come back. Beacons
+    during the run are sent by a thread of their own.
     """
 
     _quiet: threading.Event | None = None
@@ -543,3 +550,8 @@ class FreeRunningCoordinator(LockstepCoordinator):
         if self._quiet is not None:
             self._quiet.set()
         super().close()
+
+    def _ends_alone(self) -> bool:
+        failed = self._fault_reported or self.peers.fault_received
+        ran_whole = self.peers.started and self._clock.stop_request is None and not failed
+        return ran_whole and not self._links.senders

@@ -5,7 +5,7 @@ import pytest
 
 from aloft.mathematics.banded_system import TOGETHER, smallest_correction
 
-BLOCKS, WIDTH, HEIGHT = 6, 5, 3
+BLOCKS, WIDTH, HEIGHT = 9, 5, 3
 
 
 def chain(rng: np.random.Generator) -> np.ndarray:
@@ -17,7 +17,7 @@ def chain(rng: np.random.Generator) -> np.ndarray:
     return matrix
 
 
-def correct(matrix, wanted, weights, chosen, band=2 * HEIGHT + TOGETHER - 1, then=None):
+def correct(matrix, wanted, weights, chosen, band=2 * TOGETHER, then=None):
     rows, columns = np.nonzero(matrix.T)[::-1]
     starts = np.searchsorted(columns, np.arange(matrix.shape[1] + 1))
     place = np.where(chosen, np.cumsum(chosen) - 1, -1)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ....cli.shared.options import Cluster, JsonBesideTables, Workers
+from ....cli.shared.options import Cluster, JsonBesideTables, RunsFolder, Workers
 from ....cli.shared.output import (
     console,
     errors_reported,
@@ -48,9 +48,7 @@ def falsify(
             "--test", help="With --keep: the test; by default test_NAME_falsified.py in tests/."
         ),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for the runs; by default results/NAME.")
-    ] = None,
+    out: RunsFolder = None,
     workers: Workers = 0,
     cluster: Cluster = "",
     as_json: JsonBesideTables = False,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ....cli.shared.options import Cluster, JsonBesideTables, Workers
+from ....cli.shared.options import Cluster, JsonBesideTables, RunsFolder, Workers
 from ....cli.shared.output import console, errors_reported, print_json, say
 from ....cli.shared.studies import (
     check_cells,
@@ -21,9 +21,7 @@ from ....runtime.language.errors import AloftError, ExitCode
 
 def tune(
     file: Annotated[Path, typer.Argument(help="The study file, which has a section 'tune'.")],
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for the runs; by default results/NAME.")
-    ] = None,
+    out: RunsFolder = None,
     workers: Workers = 0,
     cluster: Cluster = "",
     as_json: JsonBesideTables = False,

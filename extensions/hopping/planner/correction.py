@@ -17,7 +17,7 @@ import numpy as np
 from ....mathematics.arrays import Array
 from ....mathematics.banded_system import smallest_correction
 from ....mathematics.compiling.compile_calls import compile_calls
-from ....mathematics.compiling.kernel_call import KernelCall
+from ....mathematics.compiling.kernel_call import KernelCall, aligned_zeros
 from ....planner.problem.problem import FullProblem
 from ....planner.solving.constraint_values import ConstraintValues
 from ....planner.solving.solver import VIOLATION
@@ -34,8 +34,8 @@ TOUCHED = 1e-9
 """An inequality violated by more is held at its bound from then on."""
 REGULARISATION = 1e-12
 """Share of the diagonal; with 1e-9 the contact rows, which nearly repeat each other, converge slowly."""
-BAND = 260
-"""Diagonals of the equations' matrix: the rows of a knot and those of the next one."""
+BAND = 264
+"""Diagonals of the equations' matrix, the rows of a knot and those of the next one: whole lines of the cache."""
 PLACE, RATE, ACCELERATION, FORCE, INTERVAL = 0.05, 0.5, 20.0, 10.0, 1e-3
 """Changes that count alike: of coordinates [m, rad], their rates and accelerations, forces [N] and interval lengths [s]."""
 
@@ -68,7 +68,7 @@ class Corrector:
         self._call = KernelCall(
             smallest_correction,
             self._constraints.starts, self._constraints.rows, self._constraints.entries, self._inverse, self._place, self._count, REGULARISATION,
-            np.zeros((rows, BAND)), *np.zeros((2, rows), dtype=np.int64), self._vector, self._step,
+            aligned_zeros((rows, BAND)), *np.zeros((2, rows), dtype=np.int64), self._vector, self._step,
             self._factorised, self._found,
         )  # fmt: skip
         compile_calls([self._call])
@@ -98,7 +98,7 @@ class Corrector:
             )
             held |= touched
             if not self._factorised[0]:
-                self._constraints.differentiate(self._variables)
+                self._constraints.differentiate()
             self._count[0] = held.sum()
             self._place[:] = np.where(held, np.cumsum(held) - 1, -1)
             self._vector[: self._count[0]] = np.where(below > above, below, -above)[held]
