@@ -1,4 +1,4 @@
-"""Which joint of the robot each column of a log is, for `aloft log import`: by the file's names, those given, or what the data tell."""
+"""Joints of a log's columns for `aloft log import`: by the file's names, those given, or what the data tell."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Named:
 
 @dataclass
 class LoggedJoints:
-    """What `joints.names` is to be, by column; and what is to be known of it."""
+    """The value of `joints.names`, the guess of each column, and remarks."""
 
     names: str | list[str] | None = None
     columns: list[Named] = field(default_factory=list)

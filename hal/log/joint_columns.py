@@ -22,10 +22,10 @@ from .standing_feet import RATE, LoggedMotion, StandingFeet
 SURE = 1.3
 """Times the unrest of feet by another order, above which that one is excluded."""
 FLOOR = 0.3
-"""What is added to both: below it, unrest tells nothing."""
+"""Unrest that is added to both: below it, unrest tells nothing."""
 LEAST_ROWS = 20
 OUTSIDE, OFTEN = 0.1, 0.05
-"""How far [rad, m] beyond its limits, and in what share of the rows, no column of a joint is."""
+"""A distance [rad, m] beyond a joint's limits, and a share of rows there, that exclude a column."""
 ROUNDS = 60
 WORK = 1000
 """Exchanges of two columns, of which a search tries all at each step, times searches."""

@@ -1,4 +1,4 @@
-"""How still the feet on the ground stand, if a log's columns are given to the robot's joints in some order.
+"""Stillness of the feet on the ground, if a log's columns are given to the robot's joints in some order.
 
 While a foot is on the ground, it neither turns nor tilts, and two of them neither come nearer nor leave the level. By kinematics, a wrong order of
 the columns makes them do so: its ``unrest`` is the mean of robust squares of these motions, each in units of what a real leg has.
@@ -16,7 +16,7 @@ from ...robots.robot_description import RobotDescription
 from .turns import rotation_of
 
 RATE, SPEED, TILT, HEIGHT = 0.1, 0.05, 0.06, 0.02
-"""What a standing foot of a real leg has, with its encoders' offsets: rad/s, m/s, rad and m."""
+"""Motion of a standing foot of a real leg, with its encoders' offsets: rad/s, m/s, rad and m."""
 OUTLYING = 3.0
 """Times that, above which more counts hardly more."""
 MOST_ROWS = 240
