@@ -224,6 +224,14 @@ UNUSED = {
         np.array([3]), 1e-12, np.zeros((3, 8)), np.array([1, 2, 2]), np.zeros(3, dtype=np.int64), NORMAL(3),
         np.zeros(4), np.zeros(1, dtype=np.bool_), np.zeros(1, dtype=np.bool_),
     ),
+    "aloft.mathematics.banded_system.keep_bounds": (
+        NORMAL(9), np.full(9, -0.5), np.full(9, 0.5), np.ones(9), np.zeros(1, dtype=np.bool_),
+    ),
+    "aloft.mathematics.banded_system.hold_violated": (
+        NORMAL(9), np.full(9, -0.5), np.full(9, 0.5), 1e-9, np.arange(9) % 3 == 0,
+        np.zeros(9, dtype=np.int64), np.zeros(1, dtype=np.int64), NORMAL(9), np.zeros(1),
+        np.zeros(1, dtype=np.bool_),
+    ),
     "aloft.mathematics.ground_surface.height_of_slope": (
         TERRAIN.slopes[0], 0.3, 0.4, np.zeros(3),
     ),
