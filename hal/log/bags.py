@@ -22,7 +22,7 @@ MOST_WIDE = 4096
 
 
 class _Topic:
-    """What is gathered of one topic: its fields row by row, its stamps [ns], and what cannot be a column."""
+    """One topic: its fields row by row, its stamps [ns], and what cannot be a column."""
 
     def __init__(self, name: str) -> None:
         self.name = name
