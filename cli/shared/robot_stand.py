@@ -35,7 +35,7 @@ class StandOptions:
     push: Annotated[
         str,
         typer.Option(
-            help="Push the torso forwards for 0.1 s with the impulse that changes the robot's speed by this: 0.1m/s."
+            help="Push the torso forwards for 0.1 s, so that the robot's speed changes by this: 0.1m/s."
         ),
     ] = ""
 
