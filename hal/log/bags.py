@@ -8,6 +8,7 @@ from __future__ import annotations
 from array import array
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ MOST_WIDE = 4096
 
 
 class _Topic:
-    """What is gathered of one topic: its fields row by row, its stamps [ns], and what cannot be a column."""
+    """One topic: its fields row by row, its stamps [ns], and what cannot be a column."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -131,8 +132,15 @@ class _Topic:
         return stamps
 
 
-def _fields(message: Any) -> list[str]:
-    return [each for each in getattr(message, "__dataclass_fields__", ()) if each != "__msgtype__"]
+def _fields(message: Any) -> tuple[str, ...]:
+    return _fields_of(type(message))
+
+
+@cache
+def _fields_of(kind: type) -> tuple[str, ...]:
+    return tuple(
+        each for each in getattr(kind, "__dataclass_fields__", ()) if each != "__msgtype__"
+    )
 
 
 def read_bag(path: Path) -> LogFile:

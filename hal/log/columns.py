@@ -46,7 +46,7 @@ Columns = str | list[str] | LogColumns
 
 
 class LogClock(Parameters):
-    """When the rows were taken: by stamps, by an even grid between the first and the last, or at a rate."""
+    """Times of the rows: by stamps, by an even grid between the first and the last, or at a rate."""
 
     stamps: str | None = parameter(
         None, text="the column of stamps; none: the file's own, of each topic"

@@ -163,6 +163,8 @@ def test_an_even_grid_where_rows_are_missing_is_warned_of():
     log = log_of(t=TIMES[keep], gyro=GYRO[keep], force=REST[keep])
     result = played(log, clock={"stamps": "t", "even": True})
     assert any("off their stamps, so rows are missing" in each for each in result.warnings)
+    stamped = played(log).warnings
+    assert "the log has 1 gaps" in stamped[0] and "arrival" not in " ".join(stamped)
     assert not played(log_of(), clock={"stamps": "t", "even": True}).warnings
 
 
