@@ -52,6 +52,10 @@ _UNREST_TIME = 0.3
 _FIRST_UNREST = 0.1
 _LARGEST_UNREST = 0.3
 """The low-pass of the standing points' speed [s], and that speed [m/s] at a start in a step, and at most."""
+_LEAN_TIME = 2.0
+_FLEXION_RANGE = 0.1
+"""The low-pass of a sole's apparent tilt [s], and how far from that a sole seems to tilt [rad] because its leg yields: one
+that tilts farther rolls."""
 _REST_TIME = 2.0
 """Time constant [s] with which the gyroscope's bias is learnt at rest after a step."""
 
@@ -67,6 +71,12 @@ class GroundTrust(Signal):
     aligned = Field(dtype="int64", text="ticks of alignment with the level ground")
     stepped = Field(dtype="bool", text="a point has been without contact since the start")
     unrest = Field(unit="m/s", text="speed at which the stillest point seems to move, low-passed")
+    lean = Field(
+        ("n_feet", 2),
+        unit="rad",
+        frame="world",
+        text="turn that would lay each sole flat, low-passed",
+    )
     age = Field(unit="s", text="time since the start in a step; infinite if the robot stood there")
 
 
@@ -95,6 +105,12 @@ class StateEstimatorParameters(InertialParameters):
     )
     tilt_time: float = live_parameter(
         1.0, unit="s", gt=0.0, text="time constant of the tilt correction by velocity, after a step"
+    )
+    flexion: float = live_parameter(
+        0.6,
+        ge=0.0,
+        le=1.0,
+        text="share of a sole's apparent tilt that its leg's yielding adds, after a start in a step",
     )
     bias_spread: float = live_parameter(
         0.01,
@@ -202,6 +218,8 @@ class StateEstimator(InertialEstimator):
                     estimate.orientation, scratch.force, constants.tilt_gain, scratch.vector
                 )
         set_point_positions(estimate, legs)
+        if trust.age < math.inf:
+            straighten_legs(estimate, trust, legs, params, constants, scratch)
         trusted, support = trust_points(estimate, trust, legs, params, constants, scratch)
         correct_motion(estimate, legs, params, constants, scratch, trusted, support)
         if trust.stepped:
@@ -296,6 +314,51 @@ def align_with_ground(
     limit(estimate.gyro_bias, 3.0 * params.bias_spread, estimate.gyro_bias)
     error[:] *= angle_gain
     rotate_in_world(estimate.orientation, error[0], error[1], error[2])
+
+
+@kernel
+def straighten_legs(
+    estimate: BaseEstimate,
+    trust: GroundTrust,
+    legs: LegKinematics,
+    params: StateEstimatorParameters,
+    constants: InertialConstants,
+    scratch: InertialScratch,
+) -> None:
+    """Move the points of each foot to where they are if it stands flat and its leg has yielded.
+
+    Encoders do not see a leg that yields under load, so by them the sole tilts. The points are turned back about the base by
+    the share of this tilt that arises at the leg's upper end. What does not change, such as the tilt of the ground, is
+    left alone.
+    """
+    motion, points, owners = legs.motion, legs.points, legs.contacts.foot
+    error, place, standing, turned = scratch.error, scratch.vector, scratch.standing, scratch.middle
+    passing = constants.period / (_LEAN_TIME + constants.period)
+    for foot in range(trust.lean.shape[0]):
+        for point in range(standing.shape[0]):
+            standing[point] = points.active[point] and owners[point] == foot
+        flat = misalignment(
+            estimate.orientation,
+            motion.points,
+            standing,
+            motion.forward,
+            constants.gradient,
+            error,
+            place,
+        )
+        if not flat:
+            continue
+        lean = trust.lean[foot]
+        lean[0] += passing * (error[0] - lean[0])
+        lean[1] += passing * (error[1] - lean[1])
+        x, y = error[0] - lean[0], error[1] - lean[1]
+        ratio = 1.0 + (x * x + y * y) / (_FLEXION_RANGE * _FLEXION_RANGE)
+        share = params.flexion / (ratio * ratio)
+        turned[:] = estimate.orientation
+        rotate_in_world(turned, share * x, share * y, 0.0)
+        for point in range(standing.shape[0]):
+            if standing[point]:
+                rotate(turned, motion.points[point], points.places[point])
 
 
 @kernel
