@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,9 +11,9 @@ import typer
 
 from ..runtime.language.errors import AloftError
 from .shared.output import errors_reported
+from .shared.run_panels import run_panels
 
 if TYPE_CHECKING:
-    from ..logs.file.reader import RecordedRun
     from ..plotting import Panel
 
 _WIDTH, _HEIGHT = 72, 12
@@ -24,12 +23,12 @@ _DOTS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
 
 
 def plot(
-    run: Annotated[Path, typer.Argument(help="The recording, a file .rrd.")],
+    run: Annotated[Path, typer.Argument(help="The recording, a .rrd file.")],
     signals: Annotated[
         list[str],
         typer.Argument(
-            help="block.port.field, all fields of block.port, or one element: a.b.c[2]; more "
-            "recordings first are drawn over the same axes."
+            help="block.port.field, all fields of block.port, or one element: a.b.c[2]. Further "
+            "recordings, named before the signals, are drawn over the same axes."
         ),
     ],
     png: Annotated[Path | None, typer.Option("--png", help="Draw into this PNG file.")] = None,
@@ -48,62 +47,12 @@ def plot(
         recorded = [read(file) for file in files]
         stems = [file.stem for file in files]
         shown = stems if len(set(stems)) == len(stems) else [str(file) for file in files]
-        panels = [
-            panel
-            for name in names
-            for panel in overlaid([panels_of(each, name, start, end) for each in recorded], shown)
-        ]
+        panels = run_panels(recorded, shown, names, start, end)
         if svg is not None or png is not None:
             _draw(panels, run.stem, svg, png)
             return
     for panel in panels:
         typer.echo(in_terminal(panel))
-
-
-def panels_of(run: RecordedRun, name: str, start: float | None, end: float | None) -> list[Panel]:
-    """Make one panel for every field that ``name`` says.
-
-    Raises:
-        AloftError: there is no such signal or element, or nothing was recorded in that time.
-    """
-    from ..logs.viewing.signal_names import element_names, unit_of
-    from ..runtime.running import plots
-
-    known, robot = run.signals(), run.header.robot
-
-    def legend(each: str, shape: tuple[int, ...]) -> plots.Legend:
-        field = known[each]
-        named = robot.element_names if robot else {}
-        rows = named.get(str(field.dimensions[0]), ()) if field.dimensions else ()
-        return plots.Legend(unit_of(field), element_names(field, robot), rows, field.values)
-
-    try:
-        return plots.panels_of(run, run.__getitem__, legend, name, start, end)
-    except (KeyError, ValueError) as error:
-        raise AloftError(str(error.args[0])) from error
-
-
-def overlaid(runs: Sequence[Sequence[Panel]], names: Sequence[str]) -> list[Panel]:
-    """Return one panel a field with the lines of all runs, which have their run's name before their own.
-
-    Raises:
-        AloftError: the runs have other fields of that name.
-    """
-    if len(runs) == 1:
-        return list(runs[0])
-    if len({len(panels) for panels in runs}) > 1:
-        raise AloftError("the recordings have different fields of that name; name one field")
-    return [
-        replace(
-            same[0],
-            lines=[
-                replace(line, name=f"{name} {line.name}".rstrip())
-                for name, panel in zip(names, same, strict=True)
-                for line in panel.lines
-            ],
-        )
-        for same in zip(*runs, strict=True)
-    ]
 
 
 def _draw(panels: Sequence[Panel], title: str, svg: Path | None, png: Path | None) -> None:

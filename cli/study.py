@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..runtime.language.errors import AloftError, ExitCode
-from .shared.options import Cluster, JsonBesideTables, Workers
+from .shared.options import Cluster, JsonBesideTables, StudySeeds, Workers
 from .shared.output import console, errors_reported, print_json, print_warning, say
 from .shared.studies import (
     check_cells,
@@ -37,9 +37,7 @@ def study(
     file: Annotated[
         Path, typer.Argument(help="The study file; or 'paper': redraw the paper's figures.")
     ],
-    seeds: Annotated[
-        str, typer.Option(help="Seeds in place of the study's: 0:4 for a quick look.")
-    ] = "",
+    seeds: StudySeeds = "",
     where: Annotated[
         list[str] | None,
         typer.Option(help="Only part of the grid: axis=value, task=..., arm=... Repeatable."),
@@ -78,8 +76,8 @@ def study(
 ) -> None:
     """Run a study: every graph, arm and grid point with every seed, on all cores.
 
-    Runs that were made before are not made again, so a study that was stopped or killed goes on
-    where it was. Settings are compared over equal seeds. 'aloft tune' searches the parameters of a
+    Runs that were made before are not made again, so a study that was stopped or killed continues
+    where it ended. Settings are compared over equal seeds. 'aloft tune' searches the parameters of a
     study's arms, 'aloft falsify' the worst case, and 'aloft sensitivity' ranks parameters. Exits with 0 when all goals are met, 1 when one is missed, 3 when a run broke.
 
     'aloft study paper' makes the runs of the paper's figures, draws them into docs (or --out), and

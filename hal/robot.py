@@ -24,16 +24,13 @@ from ..mathematics.arrays import Indices1D
 from ..mathematics.compiling.kernel_call import KernelCall
 from ..mathematics.kernel import kernel
 from ..robots.description import RobotDescription
-from ..runtime.language.block import Block, Context, Input, Output, Port
+from ..runtime.language.block import STOP_CYCLES, Block, Context, Input, Output, Port
 from ..runtime.language.errors import BlockError
 from ..runtime.language.parameters import Parameters
 from ..runtime.language.signals import Signal
 from ..runtime.language.steps import signal_call
 from .sensors.sensor import MountedSensor, mounted_sensors
 from .sitting import SitDown, SittingPath, sitting_path, stands
-
-STOP_CYCLES = 5
-"""Number of stop cycles that the runtime makes."""
 
 
 @kernel

@@ -343,18 +343,20 @@ def axis_rotations(axis: Sequence[float], angles: Array) -> Array:
 
 def matrices_of_quaternions(quaternions: Array) -> Array:
     """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
-    x, y, z, w = np.moveaxis(quaternions, -1, 0)
+    x, y, z, w = (quaternions[..., k] for k in range(4))
+    xx, yy, zz = x * x, y * y, z * z
+    xy, xz, yz, wx, wy, wz = x * y, x * z, y * z, w * x, w * y, w * z
     matrices = np.empty((*quaternions.shape[:-1], 3, 3))
     # As ``to_matrix``, of all at once.
-    matrices[..., 0, 0] = 1.0 - 2.0 * (y * y + z * z)
-    matrices[..., 0, 1] = 2.0 * (x * y - w * z)
-    matrices[..., 0, 2] = 2.0 * (x * z + w * y)
-    matrices[..., 1, 0] = 2.0 * (x * y + w * z)
-    matrices[..., 1, 1] = 1.0 - 2.0 * (x * x + z * z)
-    matrices[..., 1, 2] = 2.0 * (y * z - w * x)
-    matrices[..., 2, 0] = 2.0 * (x * z - w * y)
-    matrices[..., 2, 1] = 2.0 * (y * z + w * x)
-    matrices[..., 2, 2] = 1.0 - 2.0 * (x * x + y * y)
+    matrices[..., 0, 0] = 1.0 - 2.0 * (yy + zz)
+    matrices[..., 0, 1] = 2.0 * (xy - wz)
+    matrices[..., 0, 2] = 2.0 * (xz + wy)
+    matrices[..., 1, 0] = 2.0 * (xy + wz)
+    matrices[..., 1, 1] = 1.0 - 2.0 * (xx + zz)
+    matrices[..., 1, 2] = 2.0 * (yz - wx)
+    matrices[..., 2, 0] = 2.0 * (xz - wy)
+    matrices[..., 2, 1] = 2.0 * (yz + wx)
+    matrices[..., 2, 2] = 1.0 - 2.0 * (xx + yy)
     return matrices
 
 

@@ -197,3 +197,10 @@ class ChildProcess:
             part = b""
         self._said += part
         return bool(part)
+
+
+def processors() -> int:
+    """Return the number of processors that this process may use, which is how many children can work at once."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

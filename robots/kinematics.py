@@ -12,7 +12,7 @@ fixed to the foot.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +26,12 @@ from .robot_description import Joint, RobotDescription
 
 FALL_SHARE = 0.315
 """A base below this share of its standing height counts as fallen: 0.12 m for BRUCE."""
+
+
+def inertia_tensor(parts: Sequence[float]) -> Array:
+    """Return the inertia (3, 3) whose parts are xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = parts
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 @dataclass(frozen=True)

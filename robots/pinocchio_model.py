@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .kinematics import inertia_tensor
 from .robot_description import Joint, RobotDescription
 
 
@@ -59,9 +60,7 @@ def build_pinocchio_model(robot: RobotDescription, profile: str | None = None) -
         lower, upper = joint.limits or (-np.inf, np.inf)
         model.lowerPositionLimit[-1], model.upperPositionLimit[-1] = lower, upper
     for link in robot.links:
-        xx, yy, zz, xy, xz, yz = link.inertia
-        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        inertia = pin.Inertia(link.mass, np.array(link.com), tensor)
+        inertia = pin.Inertia(link.mass, np.array(link.com), inertia_tensor(link.inertia))
         model.appendBodyToJoint(carrier[link.name], inertia, pin.SE3.Identity())
     link_of_foot = {foot.name: foot.link for foot in robot.feet}
 

@@ -16,7 +16,7 @@ import numpy as np
 from ..mathematics.arrays import Array
 from ..mathematics.rotations import axis_rotations
 from .description import Joint, Link, RobotDescription, Shape, Vector3
-from .kinematics import from_base_outwards
+from .kinematics import from_base_outwards, inertia_tensor
 
 
 @dataclass(frozen=True)
@@ -240,7 +240,7 @@ def _lumped(places: dict[str, _LinkPose], parts: Sequence[Link]) -> tuple[float,
     inertia = np.zeros((3, 3))
     for link, centre in zip(parts, centres, strict=True):
         turn, off = places[link.name].rotation, centre - com
-        inertia += turn @ _tensor(link) @ turn.T
+        inertia += turn @ inertia_tensor(link.inertia) @ turn.T
         inertia += link.mass * (off @ off * np.eye(3) - np.outer(off, off))
     return mass, com, inertia
 
@@ -248,11 +248,6 @@ def _lumped(places: dict[str, _LinkPose], parts: Sequence[Link]) -> tuple[float,
 def _six(inertia: Array) -> tuple[float, float, float, float, float, float]:
     xx, yy, zz = (float(x) for x in np.diag(inertia))
     return xx, yy, zz, float(inertia[0, 1]), float(inertia[0, 2]), float(inertia[1, 2])
-
-
-def _tensor(link: Link) -> Array:
-    xx, yy, zz, xy, xz, yz = link.inertia
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def _vector(values: Array) -> Vector3:

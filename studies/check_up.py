@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..mathematics.arrays import Array
+from ..robots.kinematics import inertia_tensor
 from ..robots.plausible_size import wrong_size
 from ..robots.shapes import corners_of
 
@@ -124,8 +125,7 @@ def _inertias(robot: RobotDescription) -> Iterator[Remark]:
         along = np.array(link.com) / away
         end = float(ends.get(link.name, np.zeros(3)) @ along)
         most = math.sqrt(away * (max(2.0 * away, end) - away))
-        xx, yy, zz, xy, xz, yz = link.inertia
-        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        tensor = inertia_tensor(link.inertia)
         across = np.linalg.svd(along[None])[2][1:]
         gyration = math.sqrt(
             max(0.0, np.linalg.eigvalsh(across @ tensor @ across.T)[0]) / link.mass

@@ -15,14 +15,13 @@ from ..files.nodes import Entry, ListNode, MapNode, Node, ScalarNode, plain
 from ..files.problems import Code, LoadError, Position, Problems
 from ..runtime.loading.reading.files import files_like, graph_path
 from ..runtime.loading.reading.written import unknown_key, wrong_kind
+from .axes import read_axes, read_sets
 from .sections import (
     Labels,
-    read_axes,
     read_falsification,
     read_goals,
     read_plots,
     read_seeds,
-    read_sets,
     read_tuning,
 )
 from .study import Arm, CellFilter, Falsification, Range, Study, StudyTask

@@ -21,13 +21,13 @@ Z_95 = 1.959963984540054
 """The standard normal's quantile that leaves 2.5 % above it."""
 
 
-def wilson_interval(successes: int, n: int, z: float = Z_95) -> tuple[float, float]:
-    """Compute the score interval of E. B. Wilson (1927) for a probability of success.
+def wilson_interval(successes: int, n: int) -> tuple[float, float]:
+    """Compute the 95 % score interval of E. B. Wilson (1927) for a probability of success.
 
         centre = (p + z^2 / 2n) / (1 + z^2 / n)
         half   = z / (1 + z^2 / n) sqrt(p (1 - p) / n + z^2 / 4n^2)
 
-    with p = successes / n. Unlike the interval around p it never leaves [0, 1], and it says
+    with p = successes / n and z = ``Z_95``. Unlike the interval around p it never leaves [0, 1], and it says
     something also where all runs succeed: 40 of 40 give 0.912 to 1. Without runs it is (0, 1).
 
     Raises:
@@ -37,7 +37,7 @@ def wilson_interval(successes: int, n: int, z: float = Z_95) -> tuple[float, flo
         raise ValueError(f"{successes} successes of {n} runs")
     if n == 0:
         return 0.0, 1.0
-    p = successes / n
+    p, z = successes / n, Z_95
     scale = 1.0 + z * z / n
     centre = (p + z * z / (2 * n)) / scale
     half = z / scale * math.sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n))

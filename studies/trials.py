@@ -11,7 +11,7 @@ from ..runtime.language.errors import AloftError
 from ..runtime.loading.reading.files import settings_of
 
 
-def trial_settings(trial: str, option: str = "--trial") -> dict[str, Any]:
+def trial_settings(trial: str) -> dict[str, Any]:
     """Return the settings of a trial. What only other trials set goes back to the simulator's
     defaults.
 
@@ -22,7 +22,7 @@ def trial_settings(trial: str, option: str = "--trial") -> dict[str, Any]:
         return {}
     files = {file.stem: file for file in sorted((shipped_folder() / "trials").glob("*.yaml"))}
     if trial not in files:
-        raise AloftError(f"{option} {trial}: there is {', '.join(files)}")
+        raise AloftError(f"--trial {trial}: there is {', '.join(files)}")
     defaults = SimulatorParameters().model_dump(mode="json", round_trip=True)
     found = {
         key: value

@@ -20,6 +20,7 @@ from .study import Study
 TILT = "peak_tilt_deg"
 """The metric that ranks runs of the same outcome, where they have it: a run that leans far is near
 a fall."""
+MOST_LISTED = 50
 
 
 def worst_first(runs: Sequence[Run]) -> list[Run]:
@@ -73,9 +74,7 @@ def run_again(run: Run, sinks: Sequence[Sink]) -> RunResult:
     return seeded_graph(job(run.cell, run.seed)).run(sinks=sinks, log=False)
 
 
-def write_page(
-    study: Study, runs: Sequence[Run], path: str | PathLike[str], most: int = 50
-) -> Path:
+def write_page(study: Study, runs: Sequence[Run], path: str | PathLike[str]) -> Path:
     """Write the list of the worst runs as a Markdown page, which says how to open each."""
     ordered = worst_first(runs)
     failed = sum(not run.outcome.success for run in ordered if run.outcome is not None)
@@ -91,10 +90,10 @@ def write_page(
         "| N | run | result | tilt [deg] |",
         "|--:|---|---|--:|",
     ]
-    for number, run in enumerate(ordered[:most], 1):
+    for number, run in enumerate(ordered[:MOST_LISTED], 1):
         lines.append(f"| {number} | {labels_of(run)} | {_result(run)} | {_tilt(run)} |")
-    if len(ordered) > most:
-        lines += ["", f"{len(ordered) - most} further runs are not listed."]
+    if len(ordered) > MOST_LISTED:
+        lines += ["", f"{len(ordered) - MOST_LISTED} further runs are not listed."]
     path = Path(path)
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path

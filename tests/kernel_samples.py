@@ -203,25 +203,34 @@ UNUSED = {
     "aloft.mathematics.elementary.hypot": (0.3, -0.4),
     "aloft.mathematics.banded_system.assemble_normal": (
         CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3), 3,
-        np.zeros((3, 3)), *np.zeros((2, 3), dtype=np.int64), np.zeros(3),
+        np.zeros((3, 8)), *np.zeros((2, 3), dtype=np.int64), np.zeros(3),
     ),
     "aloft.mathematics.banded_system.factorise_band": (
-        6, 1e-3, np.tile([3.0, 0.5, -0.2, 0.0, 0.0, 0.0], (6, 1)), np.array([2, 3, 4, 5, 5, 5]),
+        12, 1e-3, np.array([np.roll([3.0, 0.5, -0.2, *[0.0] * 13], j % 8) for j in range(12)]),
+        np.minimum(np.arange(12) + 2, 11),
     ),
     "aloft.mathematics.banded_system.solve_band": (
-        3, np.array([[3.0, 0.5], [4.0, -0.7], [2.0, 0.0]]), np.array([1, 2, 2]), NORMAL(3),
+        3, np.array([[3.0, 0.5, 0.0], [0.0, 4.0, -0.7], [0.0, 0.0, 2.0]]), np.array([1, 2, 2]), NORMAL(3),
     ),
     "aloft.mathematics.banded_system.fill_zeros": (NORMAL(3),),
     "aloft.mathematics.banded_system.divide": (NORMAL(3), 1.7),
     "aloft.mathematics.banded_system.subtract_product": (NORMAL(3), 0.3, NORMAL(3)),
     "aloft.mathematics.banded_system.subtract_products": (
-        NORMAL(21), 0.3, NORMAL(21), -0.2, NORMAL(21), 0.0, NORMAL(21), 1.4, NORMAL(21),
+        NORMAL(21), *(each for factor in (0.3, -0.2, 0.0, 1.4, 0.7, -1.1, 0.9, 0.1) for each in (factor, NORMAL(21))),
     ),
     "aloft.mathematics.banded_system.without_products": (0.7, NORMAL(3), NORMAL(3)),
     "aloft.mathematics.banded_system.smallest_correction": (
         CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3),
-        np.array([3]), 1e-12, np.zeros((3, 3)), np.array([1, 2, 2]), np.zeros(3, dtype=np.int64), NORMAL(3),
+        np.array([3]), 1e-12, np.zeros((3, 8)), np.array([1, 2, 2]), np.zeros(3, dtype=np.int64), NORMAL(3),
         np.zeros(4), np.zeros(1, dtype=np.bool_), np.zeros(1, dtype=np.bool_),
+    ),
+    "aloft.mathematics.banded_system.keep_bounds": (
+        NORMAL(9), np.full(9, -0.5), np.full(9, 0.5), np.ones(9), np.zeros(1, dtype=np.bool_),
+    ),
+    "aloft.mathematics.banded_system.hold_violated": (
+        NORMAL(9), np.full(9, -0.5), np.full(9, 0.5), 1e-9, np.arange(9) % 3 == 0,
+        np.zeros(9, dtype=np.int64), np.zeros(1, dtype=np.int64), NORMAL(9), np.zeros(1),
+        np.zeros(1, dtype=np.bool_),
     ),
     "aloft.mathematics.ground_surface.height_of_slope": (
         TERRAIN.slopes[0], 0.3, 0.4, np.zeros(3),
@@ -495,7 +504,6 @@ UNUSED |= {
     for each in vars(numpy_numbers).values()
     if is_kernel(each) and each.__module__ == numpy_numbers.__name__
 }
-UNUSED["aloft.blocks.scoring.estimator_score.heading"] = (np.array([0.1, 0.2, 0.3, 0.92]),)
 UNUSED["aloft.hal.simulated.physics_step.begin_flight_step"] = (
     np.zeros(1), JointResistance(np.array([0.1, 0.2]), np.array([0.3, 0.4])),
     JointResistance(np.zeros(2), np.zeros(2)), np.zeros(1, np.int64), np.ones(1, np.int64),

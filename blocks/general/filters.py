@@ -182,12 +182,21 @@ class MovingAverage(UnitOfInput, Block):
     @kernel
     @staticmethod
     def step(u: Vector, y: Vector, x: RecentInputs, params: Params) -> None:
-        x.values[x.count % params.samples, :] = u.value
+        samples = params.samples
+        x.values[x.count % samples, :] = u.value
         x.count += 1
-        y.value[:] = 0.0
-        for k in range(params.samples):
-            y.value[:] += x.values[k, :]
-        y.value[:] /= min(x.count, params.samples)
+        known = min(x.count, samples)
+        if y.value.size > 8:  # many sums at once
+            y.value[:] = 0.0
+            for k in range(samples):
+                y.value[:] += x.values[k, :]
+            y.value[:] /= known
+            return
+        for i in range(y.value.size):  # a sum in a register does not wait for memory
+            total = 0.0
+            for k in range(samples):
+                total += x.values[k, i]
+            y.value[i] = total / known
 
 
 class DerivativeState(Signal):

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Literal
-
-import numpy as np
+from typing import Literal
 
 from ...mathematics.kernel import kernel
 from ...runtime.language.block import Block, Input, Output, State
@@ -13,15 +10,6 @@ from ...runtime.language.parameters import Parameters, live_parameter, parameter
 from ...runtime.language.quantities import InputQuantities, OutputQuantities
 from ...runtime.language.signals import Field, Signal
 from .vectors import NEVER, CountState, Flag, Flags, Number, Seconds, Vector, VectorParameters
-
-UFUNCS: Mapping[str, tuple[Any, bool]] = {
-    "and": (np.logical_and, False),
-    "or": (np.logical_or, False),
-    "xor": (np.logical_xor, False),
-    "nand": (np.logical_and, True),
-    "nor": (np.logical_or, True),
-}
-"""The function of each operation, and whether its result is negated."""
 
 
 class Logic(Block):
@@ -52,12 +40,6 @@ class Logic(Block):
                 y.value[i] = not (p and q)
             else:
                 y.value[i] = not (p or q)
-
-
-COMPARISONS: Mapping[str, Any] = {
-    "<": np.less, "<=": np.less_equal, "==": np.equal, "!=": np.not_equal,
-    ">=": np.greater_equal, ">": np.greater,
-}  # fmt: skip
 
 
 class Compare(Block):

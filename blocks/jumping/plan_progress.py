@@ -11,7 +11,7 @@ from ...mathematics.elementary import atan2
 from ...mathematics.kernel import kernel
 from ...mathematics.rotations import pitch_angle, wrap
 from ...mathematics.stance_feet import has_contact
-from ...planner.library.jump_table import FlightRotation, TableRows
+from ...planner.library.jump_table import PITCH, FlightRotation, TableRows
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
 from ..signals import DelayEstimate, DynamicsTerms, JumpReference, Phase
@@ -24,8 +24,6 @@ SLOWEST = 0.5
 """Vertical speed [m/s] below which a height makes no difference to the apex yet."""
 LEAST_PUSH = 8.0
 """Acceleration [m/s^2] by which at least a delay of the plan is taken to speed the robot up."""
-PITCH = 1
-"""The axis of a somersault: the world's y axis, which is the body's too."""
 SETTLED = 0.02
 """Time after lift-off [s] from which the measured momentum is that of the flight."""
 FULL = 0.95

@@ -19,9 +19,7 @@ from ..signals import (
     Phase,
     PhaseState,
 )
-
-NEVER = -1.0
-"""A time that has not come."""
+from .standing import NEVER
 
 
 class ObservedCriteria(Parameters):

@@ -15,6 +15,7 @@ from ..signals import JumpReference, RobotTruth, WholeBodyCommand
 from .footing import BallFeet, Footing
 from .standing import (
     NEVER,
+    SETTLING,
     StandConstants,
     StandCriteria,
     StandRecord,
@@ -30,9 +31,6 @@ from .standing import (
     record_robot,
     rest_metrics,
 )
-
-SETTLING = 0.15
-"""A foot that has taken a step may settle for so long [s]."""
 
 
 class SquatRecord(StandRecord):

@@ -26,6 +26,8 @@ from .footing import (
 
 NEVER = -1.0
 """The value of a time that has not come yet."""
+SETTLING = 0.15
+"""A foot that has taken a step may settle for so long [s]."""
 Verdict = tuple[Any, str]
 """The outcome of a criterion (Python's or NumPy's bool), and the reason if it does not hold."""
 

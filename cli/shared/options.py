@@ -90,7 +90,7 @@ Trust = Annotated[
     bool,
     typer.Option(
         "--trust",
-        help="Run the code that the recording names and that is not aloft's; remembered for its content.",
+        help="Run the code outside aloft that the recording names; remembered until that code changes.",
     ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Only print pass or fail.")]
@@ -100,6 +100,12 @@ CompletedOverrides = Annotated[
     list[str] | None, typer.Option("--set", help=SET_HELP, autocompletion=parameter_names)
 ]
 Workers = Annotated[int, typer.Option(help="Worker processes; 0: one per core.", min=0)]
+RunsFolder = Annotated[
+    Path | None, typer.Option("--out", help="Folder for the runs; by default results/NAME.")
+]
+StudySeeds = Annotated[
+    str, typer.Option("--seeds", help="Seeds in place of the study's: 0:4 for a quick look.")
+]
 Cluster = Annotated[str, typer.Option(help="Run on a Dask cluster: tcp://127.0.0.1:8786.")]
 
 

@@ -38,7 +38,7 @@ from .output import (
     number,
     table,
 )
-from .run_graph import report_run
+from .run_graph import KeptRecording, report_run
 from .running_graphs import registered
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 
 GRACE = 15.0
-"""Seconds that the other parts have to end after one has ended."""
+"""Seconds that the other parts have to end after one has ended that does not end alone."""
 
 
 @dataclass(frozen=True)
@@ -105,8 +105,8 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
                 problem = f"no whole recording: {target} cannot be written ({why})"
                 problem += f"; {remedy(cause_of(error), target)}"
     return report_run(
-        out, graph, result, as_json=options.as_json, traceback=options.traceback,
-        recording=recording, problem=problem, tables=_link_tables(part_reports),
+        out, graph, result, KeptRecording(recording, problem), as_json=options.as_json,
+        traceback=options.traceback, tables=_link_tables(part_reports),
         warnings=result.warnings, last={"machines": part_reports},
     )  # fmt: skip
 
@@ -142,7 +142,9 @@ def _run_processes(
                 parent_death=signal.SIGTERM,  # its blocks come to rest before it ends
             )  # fmt: skip
             running[machine] = stack.enter_context(part)
-        outputs, received = _wait_for_all(running)
+        free = placed.graph.links.mode == "free"
+        alone = [name for name in running if free and not placed.sent_by(name)]
+        outputs, received = _wait_for_all(running, alone)
         part_reports = {}
         for machine, part in running.items():
             try:
@@ -168,8 +170,10 @@ def main(*arguments: str) -> None:
 
 def _wait_for_all(
     running: Mapping[str, ChildProcess],
+    alone: Sequence[str] = (),
 ) -> tuple[dict[str, bytes], list[signal.Signals]]:
-    """Wait until every process has ended; pass on SIGINT and SIGTERM, and end those that hang.
+    """Wait until every process has ended; pass on SIGINT and SIGTERM, and end those that hang after
+    the end of one that is not named in ``alone``.
 
     Returns what each has printed, and the signals that were passed on.
     """
@@ -191,9 +195,10 @@ def _wait_for_all(
                 for machine, part in running.items()
                 if part.stdout is not None
             }
-            wait(outputs.values(), return_when=FIRST_COMPLETED)
+            ending = [output for machine, output in outputs.items() if machine not in alone]
+            wait(ending, return_when=FIRST_COMPLETED)
             for number in (signal.SIGTERM, signal.SIGKILL):
-                if wait(outputs.values(), timeout=GRACE).not_done:
+                if wait(outputs.values(), timeout=GRACE if ending else None).not_done:
                     send(number)
         return {machine: output.result() for machine, output in outputs.items()}, received
     finally:

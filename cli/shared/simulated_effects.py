@@ -34,14 +34,14 @@ class Setting(NamedTuple):
     source: str
 
 
-def simulated_effects(trial: str = TRIAL) -> list[dict[str, Any]]:
+def simulated_effects() -> list[dict[str, Any]]:
     """Return every parameter of an effect: ``group``, ``parameter``, ``text``, ``unit``,
-    ``default``, the trial's value (``trial``, ``None`` if it sets nothing) and ``source``.
+    ``default``, the value of ``TRIAL`` (``trial``, ``None`` if it sets nothing) and ``source``.
 
     Groups are those of the simulator's parameters that ``hal/simulated/effects.py`` declares. Of its other
     parameters those count as effects that the trial sets.
     """
-    settings = commented_settings(trial)
+    settings = commented_settings(TRIAL)
     rows, alone = [], []
     for place, owner, off in _groups(SimulatorParameters, "", False):
         for name, info in owner.model_fields.items():

@@ -119,15 +119,11 @@ class BearBus:
     Args:
         port: the serial port.
         reply_time: seconds that an actuator has for its reply.
-        tries: number of times that a question is asked.
     """
 
-    def __init__(
-        self, port: SerialPort, *, reply_time: float = REPLY_TIME, tries: int = TRIES
-    ) -> None:
+    def __init__(self, port: SerialPort, *, reply_time: float = REPLY_TIME) -> None:
         self.port = port
         self.reply_time = reply_time
-        self.tries = tries
         self.counts = BusCounts()
         self.now: Callable[[], float] = getattr(port, "now", time.monotonic)
         """The time [s] by which answers are awaited; a port in virtual time has its own."""
@@ -236,12 +232,12 @@ class BearBus:
     def _ask(self, device: int, code: Instruction, data: bytes, length: int) -> Reply:
         """Ask up to ``tries`` times, and return the answer."""
         question = frame_bytes(device, code, data)
-        for _ in range(self.tries):
+        for _ in range(TRIES):
             reply = self._try(question, device, length)
             if reply is not None:
                 return reply
         raise NoReplyError(
-            f"actuator {device} does not answer {code.name} after {self.tries} tries of "
+            f"actuator {device} does not answer {code.name} after {TRIES} tries of "
             f"{1e3 * self.reply_time:g} ms; check its power, its address and the cable"
         )
 

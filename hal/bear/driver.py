@@ -231,7 +231,7 @@ def soft_start(loop: MotorLoop, standing: Array, next_cycle: Callable[[], bool])
     loop.phase = DrivePhase.HOLDING
 
 
-STOP_CYCLES = 5
+_DAMPING_COMMANDS = 5
 """Least number of damping commands, since an instruction may be lost."""
 _LOOK = 0.1
 """The time between two looks at the windings that cool down [s]."""
@@ -316,7 +316,7 @@ class Driver:
             self.loop.measured.forget_torques()  # those of the way to the standing pose
         except BaseException:
             self.loop.phase = DrivePhase.DAMPED
-            self.damp(STOP_CYCLES)
+            self.damp(_DAMPING_COMMANDS)
             raise
 
     def damp(self, cycles: int = 1) -> None:

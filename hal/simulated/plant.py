@@ -42,7 +42,6 @@ from .parameters import SimulatorParameters
 from .physics_step import flight_step_calls, step_calls
 from .sensors import SimulatedSensors
 from .stance import (
-    StartCheck,
     centre_on_origin,
     holding_gains,
     holding_torque,
@@ -50,6 +49,7 @@ from .stance import (
     put_down,
     set_standing_pose,
 )
+from .start_check import StartCheck
 from .state import (
     PhysicsState,
     SensorMemory,

@@ -23,6 +23,7 @@ from .export import export
 from .falsification import falsification
 from .frontier import frontier
 from .general_blocks import general_blocks
+from .growth import growth
 from .hopping_on import hopping_on
 from .jumps.identification import identification
 from .jumps.jumps import jumps
@@ -50,6 +51,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
     "tick": tick,
     "solvers": solvers,
     "speed": speed,
+    "growth": growth,
     "startup": startup,
     "loading": loading,
     "scheduler": scheduler,
@@ -85,7 +87,7 @@ BENCHMARKS: Mapping[str, Callable[..., list[Row]]] = {
 """All benchmarks by name; each returns its rows."""
 LONG = (
     "paper_plans", "paper_solvers",
-    "agreement", "speed", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
+    "agreement", "speed", "growth", "jumps", "real_robot", "known_effects", "identification", "frontier", "link_delays", "courses",
     "pushed_courses", "changed_targets", "hopping_on", "stones", "staircase", "go2_staircase", "every_robot",
     "mutated_robots", "robot_files",
 )  # fmt: skip
@@ -112,7 +114,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
     "jitter": ("link_delays",),
     "loss": ("link_delays",),
     "tsid": ("tick", "export"),
-    "since": ("tick", "speed"),
+    "since": ("tick", "speed", "growth"),
     "everything": ("speed",),
     "arms": ("real_robot",),
     "robot": ("courses", "real_robot"),

@@ -33,7 +33,7 @@ JUMP = "aloft/graphs/jump.yaml"
 GROWTH_GOAL, WHOLE_GOAL = 1.3, 1.5
 """Largest good growth of a block's start from 100 to 4,900 blocks, and time of a jump's ticks as a multiple of MuJoCo's alone."""
 
-CHAINS = """
+CHAIN = """
 import json, time
 import aloft
 
@@ -41,7 +41,11 @@ def chain(count):
     lines = ["rate: 100 Hz", "blocks:", "  g0: {use: blocks.SineWave, with: {amplitude: 1.0}}"]
     lines += [f"  g{k}: {{use: blocks.Gain, with: {{gain: 1.01}}, in: {{u: g{k - 1}.y}}}}" for k in range(1, count + 1)]
     return "\\n".join(lines) + "\\n"
-
+"""
+"""Defines the file of a graph of so many blocks in a row."""
+CHAINS = (
+    CHAIN
+    + """
 def measure(count):
     begin = time.process_time()
     graph = aloft.load(chain(count))
@@ -54,6 +58,7 @@ few = min(measure(100)[1] for _ in range(5))
 load, start = measure(4900)
 print(json.dumps({"load": load, "start": start, "growth": start / 4900 / (few / 100)}))
 """
+)
 """Loads and starts chains of blocks; prints the processor times [s] and the growth of a block's."""
 
 

@@ -63,7 +63,7 @@ def bench(
     since: Annotated[
         str,
         typer.Option(
-            help="An earlier build, a commit or a folder: 'speed' gives ratios to it, 'tick' measures its controller."
+            help="An earlier build, a commit or a folder: 'speed' and 'growth' give ratios to it, 'tick' measures its controller."
         ),
     ] = "",
     everything: Annotated[

@@ -109,7 +109,8 @@ def traced(
         AloftError: one of them broke.
     """
     from ...cli.shared.output import progress_bar
-    from ...studies.batch.jobs import job_results, processors
+    from ...processes.child_process import processors
+    from ...studies.batch.jobs import job_results
     from ...studies.expansion import job
     from ..figures.trace import make_trace
 

@@ -21,9 +21,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import study_data
 from ending_tables import fault_table, ground_table
 from result_tables import (
     FRONTIER_PICTURE,
+    GROWTH_PICTURE,
     SEEDS,
     TICK_PICTURE,
     agreement_table,
@@ -31,6 +33,7 @@ from result_tables import (
     effects_table,
     every_robot_table,
     frontier_table,
+    growth_table,
     mutated_robots_table,
     noted_table,
     quarter_table,
@@ -47,6 +50,7 @@ from result_tables import (
 
 from aloft.extensions.commissioning.reach.reach import BRUCE, beside
 from aloft.lab.benchmarks.tick.chart import tick_chart
+from aloft.lab.figures.growth import growth_chart
 from aloft.planner.task.boundary_set import BoundarySet
 from aloft.planner.task.margins import Margins
 from aloft.planner.task.sequence import Hop, KnownStairs, PhaseSpec, RoughGround
@@ -347,6 +351,18 @@ def write_tick(file: Path) -> None:
     (DOCS / TICK_PICTURE).write_text(tick_chart(found["rows"]), encoding="utf-8")
 
 
+def write_growth(file: Path) -> None:
+    """Write the growth curves: their data file, table and picture."""
+    benchmark = "lab/benchmarks/growth.py"
+    data = {
+        "study": benchmark, "commit": study_data.git(ROOT, "rev-parse", "HEAD"),
+        "measures": [benchmark], "pages": ["docs/compiled.md"], **read_json(file),
+    }  # fmt: skip
+    study_data.write(ROOT, "growth", data)
+    refresh(DOCS / "compiled.md", "data: growth", growth_table(data))
+    (DOCS / GROWTH_PICTURE).write_text(growth_chart(data["rows"]), encoding="utf-8")
+
+
 def write_solvers(file: Path) -> None:
     """Write the duration of a tick with every solver of quadratic programs."""
     refresh(DOCS / "whole_body.md", "solvers", solver_table(read_json(file)))
@@ -403,6 +419,7 @@ PAGES = {
         write_wrong_imu, f"{STUDIES}wrong_imu.yaml", "results/wrong_imu/summary.json"
     ),
     "frontier": Page(write_frontier, "aloft bench frontier", "results/frontier"),
+    "growth": Page(write_growth, "aloft bench growth --since COMMIT --json > FILE", "FILE"),
     "ground": Page(write_ground, f"{STUDIES}ground.yaml", "results/ground/summary.json"),
     "known_effects": Page(
         write_known_effects, "aloft bench known_effects", "results/real_robot/effects.json"

@@ -8,6 +8,7 @@ from statistics import median
 from typing import Any
 
 from aloft.lab.benchmarks.tick.chart import BARS
+from aloft.lab.figures.growth import measured, seconds
 from aloft.studies.batch.seeds import SeedRow
 from aloft.studies.summary import wilson_interval
 
@@ -306,6 +307,32 @@ def tick_tables(found: Row) -> str:
 def ratio_table(found: Row) -> str:
     """Format the conditions of the measurement, and one row each."""
     return f"{_circumstances(found)}\n\n" + table(TICK_HEAD, map(_ratio, found["rows"]))
+
+
+GROWTH_PICTURE = "growth.svg"
+
+
+def growth_table(data: Row) -> str:
+    """Format the picture and the ends of every curve: by how much the work and its time grow, and the ratios to the earlier build."""
+    lines = []
+    for curve in measured(data["rows"]):
+        few, many = curve.points[0], curve.points[-1]
+        ratios = [f"{curve.times[k] / curve.earlier[k]:.2f}" for k in (0, -1) if curve.earlier]
+        lines.append(
+            (
+                f"{curve.work}: {few:,} to {many:,} {curve.over}",
+                f"{seconds(curve.times[0])} to {seconds(curve.times[-1])}",
+                f"{many / few:.1f}",
+                f"{curve.times[-1] / curve.times[0]:.1f}",
+                " to ".join(ratios),
+            )
+        )
+    since = data["rows"][0]["peer"][:8]
+    head = ("", "processor time", "times as many", "times the time", f"by {since}")
+    return (
+        f"{_circumstances(data)} Code of commit {data['commit'][:8]}.\n\n"
+        f"![What grows with what]({GROWTH_PICTURE})\n\n" + table(head, lines)
+    )
 
 
 def solver_table(found: Row) -> str:

@@ -28,6 +28,8 @@ from statistics import median
 from types import MappingProxyType
 from typing import Any
 
+from result_tables import growth_table
+
 ROOT = Path(__file__).parents[2]
 DATA = "docs/data"
 PAGES: Mapping[str, tuple[str, ...]] = {
@@ -235,6 +237,8 @@ def made_line(data: Mapping[str, Any]) -> str:
 
 def inside_of(data: Mapping[str, Any]) -> str:
     """Return what stands between the marks of a data file that is not stale."""
+    if "machine" in data:
+        return growth_table(data)
     return table_of(data) if "rows" in data else made_line(data) + "\n" if "seeds" in data else ""
 
 

@@ -43,9 +43,16 @@ SHARE, LIMIT, TOP = 0.2, 5.0, 8.0
 EFFECTS: dict[str, dict[str, Any]] = {
     "no friction, no rotors": {"free": True},
     "friction and rotors": {},
+    "latency 3 ms": {"latency": "3 ms"},
+    "latency 4 ms": {"latency": "4 ms"},
+    "latency 4 ms, static friction x 3": {"latency": "4 ms", "joints": {"static_friction": 3.0}},
+    "latency 4 ms, encoders of 2 mrad": {"latency": "4 ms", "sensors": {"encoder_resolution": 0.002}},
     "latency 5 ms": {"latency": "5 ms"},
     "latency 8 ms": {"latency": "8 ms"},
     "latency 8 ms, speed noise": {"latency": "8 ms", "noise": 0.05},
+    "latency 8 ms, static friction x 2": {"latency": "8 ms", "joints": {"static_friction": 2.0}},
+    "latency 8 ms, encoders of 10 mrad": {"latency": "8 ms", "sensors": {"encoder_resolution": 0.01}},
+    "latency 8 ms, friction of the elbow x 1.35": {"latency": "8 ms", "elbow": 0.18},
     "latency 2 ms, gears of 1000 N m/rad": {"latency": "2 ms", "gears": {"stiffness": 1000.0, "damping": 0.5}},
     "the same, play of 10 mrad": {
         "latency": "2 ms", "gears": {"stiffness": 1000.0, "damping": 0.5, "backlash": 0.01}
@@ -59,8 +66,8 @@ def moments() -> tuple[float, float]:
     return max(found[0], 1e-4), max(found[1], 1e-4)
 
 
-def write_robot(folder: Path, free: bool = False) -> Path:
-    """Write the pendubot's description, ``free`` of friction and rotors."""
+def write_robot(folder: Path, free: bool = False, elbow: float = FRICTION) -> Path:
+    """Write the pendubot's description, ``free`` of friction and rotors, or with another friction of its ``elbow`` [N m]."""
     first, second = moments()
 
     def link(name: str, mass: float, com: float, moment: float) -> str:
@@ -86,7 +93,7 @@ def write_robot(folder: Path, free: bool = False) -> Path:
         + (
             "  free: {friction: 0, damping: 0, rotor_inertia: 0}\n"
             if free
-            else f"  real: {{friction: {FRICTION}, damping: 0.001, rotor_inertia: {ROTOR}}}\n"
+            else f"  real: {{friction: {FRICTION}, damping: 0.001, rotor_inertia: {ROTOR}, motors: {{elbow: {{friction: {elbow}}}}}}}\n"
         )
         + "sensors: {imu: false, switches: false}\n"
     )
@@ -184,7 +191,7 @@ class Controller(Block):
 
 def graph_of(robot: Path, effect: Mapping[str, Any], duration: float = 20.0) -> dict[str, Any]:
     """Return the graph of the swing-up with an effect of ``EFFECTS``."""
-    actuators = {"gears": effect["gears"]} if "gears" in effect else {}
+    actuators = {part: effect[part] for part in ("gears", "joints") if part in effect}
     return {
         "rate": "400 Hz", "duration": f"{duration} s", "robot": str(robot),
         "blocks": {
@@ -193,6 +200,7 @@ def graph_of(robot: Path, effect: Mapping[str, Any], duration: float = 20.0) -> 
                 "with": {
                     "latency": effect.get("latency", "0 ms"),
                     "timestep": "0.25 ms", "start": {"stand": False}, "ground": {"scene": "none"}, "actuators": actuators,
+                    "sensors": effect.get("sensors", {}),
                 },
                 "in": {"command": "controller.command"},
             },
@@ -223,15 +231,23 @@ def figures(time: Array, angles: Array, torque: Array) -> dict[str, Any]:
     changes = float((np.diff(np.sign(shoulder)) != 0).sum()) / (float(time[-1]) - TOP)
     return {
         "apart": np.sqrt((np.array(apart) ** 2).mean(axis=1)), "sway": angles[top].std(axis=0),
+        "lean": angles[top].mean(axis=0) - [math.pi, 0.0], "slow": _slow(time[top], angles[top, 0]),
         "torque": float(shoulder.std()), "saturated": float((np.abs(shoulder) > 0.95 * LIMIT).mean()),
         "changes": changes, "fell": float(np.abs(angles[top, 0] - math.pi).max() > 1.5),
     }  # fmt: skip
 
 
+def _slow(time: Array, angle: Array) -> float:
+    """Return the frequency below 3 Hz with the most power [Hz]; a drift has the lowest."""
+    power = np.abs(np.fft.rfft((angle - angle.mean()) * np.hanning(len(angle)))) ** 2
+    found = np.fft.rfftfreq(len(angle), (time[-1] - time[0]) / (len(time) - 1))
+    return float(found[np.argmax(np.where((found > 0.2) & (found < 3.0), power, 0.0))])
+
+
 def run_of(effect: Mapping[str, Any], duration: float) -> tuple[Array, Array, Array]:
     """Run the swing-up with an effect, and return times (n,), angles (n, 2) and commanded torques (n, 2)."""
     with tempfile.TemporaryDirectory() as folder:
-        robot = write_robot(Path(folder), "free" in effect)
+        robot = write_robot(Path(folder), "free" in effect, effect.get("elbow", FRICTION))
         result = load(graph_of(robot, effect, duration)).run()
     result.raise_if_failed()
     angles = np.asarray(result.signal("robot.joints.position"))
@@ -249,8 +265,8 @@ def simulated(effect: Mapping[str, Any], duration: float = 20.0) -> dict[str, An
 
 def rows(picture: Path | None = None) -> Iterator[str]:
     """Give the lines of the table, and draw the swing with 8 ms of latency beside the log's into ``picture``."""
-    yield "| case | swing: from the log [rad rms] | top: std of the angles [rad] | shoulder's torque, std [N m] | saturated | changes of sign a second |"
-    yield "|---|---|---|---|---|---|"
+    yield "| case | swing: from the log [rad rms] | top: std of the angles [rad] | their lean [rad] | most below 3 Hz at [Hz] | shoulder's torque, std [N m] | saturated | changes of sign a second |"
+    yield "|---|---|---|---|---|---|---|---|"
     time, angles, torque = measured()
     cases = {"measured": figures(time, angles, torque)}
     cases |= {name: simulated(effect) for name, effect in EFFECTS.items()}
@@ -269,10 +285,11 @@ def rows(picture: Path | None = None) -> Iterator[str]:
     for name, found in cases.items():
         apart = "" if name == "measured" else ", ".join(f"{each:.3f}" for each in found["apart"])
         if found["fell"]:
-            yield f"| {name} | {apart} | falls | | | |"
+            yield f"| {name} | {apart} | falls | | | | | |"
             continue
         sway = ", ".join(f"{each:.3f}" for each in found["sway"])
-        yield f"| {name} | {apart} | {sway} | {found['torque']:.2f} | {found['saturated']:.2f} | {found['changes']:.1f} |"
+        lean = ", ".join(f"{each:.2f}" for each in found["lean"])
+        yield f"| {name} | {apart} | {sway} | {lean} | {found['slow']:.1f} | {found['torque']:.2f} | {found['saturated']:.2f} | {found['changes']:.1f} |"
 
 
 def main() -> None:

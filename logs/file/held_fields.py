@@ -15,12 +15,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ...runtime.language.layout import ALIGNMENT
 from ...runtime.language.recording_cost import LEAST_BYTES
 from ...runtime.language.schedule import runs_at
 from ...runtime.language.signals import DTYPES
 from .format import Header, RecordedField, RecordedLayout
 
-_ALIGNMENT = 64
 Rows = NDArray[np.uint8]
 Copy = tuple[int, int, int, int]
 """First byte and end in the bus, first byte and end in the part."""
@@ -129,7 +129,7 @@ def _group(
     offsets, size = {}, 0
     for section, length in lengths.items():
         offsets[section] = size
-        size += -(-length * DTYPES[section].itemsize // _ALIGNMENT) * _ALIGNMENT
+        size += -(-length * DTYPES[section].itemsize // ALIGNMENT) * ALIGNMENT
     layout = RecordedLayout(tuple(placed), lengths, offsets, size)
     here, there = bus.layout(), layout.layout()
     copies: list[Copy] = []

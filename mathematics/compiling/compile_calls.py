@@ -9,7 +9,7 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
-from ...processes.child_process import ChildProcess
+from ...processes.child_process import ChildProcess, processors
 from ..kernel import kernels
 from . import shipped, store
 from .arguments import ArgumentType, pack, type_of
@@ -17,7 +17,7 @@ from .failures import CompileError
 from .fingerprint import fingerprint
 from .kernel_call import KernelCall
 from .machine_code import MachineCode, optimised, tools
-from .sharing import CompileJob, divide, helpers, processors
+from .sharing import CompileJob, divide, helpers
 
 Watcher = Callable[[int, int], None]
 

@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Array
+
 if TYPE_CHECKING:
     from .machine_code import MachineCode
 
@@ -79,6 +81,19 @@ class KernelCall:
         """Go back to plain Python."""
         self.run = partial(self.kernel, *self.arguments)
         self.compiled = None
+
+
+CACHE_LINE = 64
+"""bytes"""
+
+
+def aligned_zeros(shape: tuple[int, int]) -> Array:
+    """Return zeros that begin with a line of the cache, so that no vector of a processor's in rows of whole lines lies
+    in two of them.
+    """
+    memory = np.zeros(shape[0] * shape[1] + CACHE_LINE // 8)
+    start = -memory.ctypes.data % CACHE_LINE // 8
+    return memory[start : start + shape[0] * shape[1]].reshape(shape)
 
 
 _collecting: list[list[KernelCall]] = []

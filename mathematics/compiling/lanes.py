@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
+from .kernel_call import aligned_zeros
 from .machine_code import ENTRY, MachineCode, machine_code_of
 
 WIDTH = 8
@@ -45,7 +46,7 @@ _ARITHMETIC: dict[str, Callable[[Any, Any, Any], Any]] = {
     "or": lambda to, a, b: _number(to, to.or_(_true(to, a), _true(to, b))),
     "if": lambda to, a, b: to.select(_true(to, a), b, _all_lanes(0.0)),
 }
-"""What each operation makes of one or two vectors. Truths are 1 and 0; ``if`` is b where a is not zero, else zero."""
+"""The result of each operation on one or two vectors. Truths are 1 and 0; ``if`` is b where a is not zero, else zero."""
 _LIBRARY = {
     "sin": 1, "cos": 1, "tan": 1, "asin": 1, "acos": 1, "atan": 1, "sinh": 1, "cosh": 1, "tanh": 1,
     "exp": 1, "log": 1, "floor": 1, "ceil": 1, "atan2": 2, "pow": 2, "fmin": 2, "fmax": 2,
@@ -80,20 +81,26 @@ class Lanes:
     Args:
         program: the program.
         lanes: how many sets of inputs there are.
-        inputs, outputs: the numbers of entries of each.
+        inputs, outputs: the numbers of entries of each, or memory for the entries of all lanes.
 
     Attributes:
         inputs, outputs: of each (lanes, entries).
     """
 
     def __init__(
-        self, program: Program, lanes: int, inputs: Sequence[int], outputs: Sequence[int]
-    ) -> None:
+        self, program: Program, lanes: int,
+        inputs: Sequence[int | Array], outputs: Sequence[int | Array],
+    ) -> None:  # fmt: skip
         vectors = -(-lanes // WIDTH)
-        self.inputs = [np.zeros((lanes, size)) for size in inputs]
-        self.outputs = [np.zeros((lanes, size)) for size in outputs]
+        self.inputs, self.outputs = (
+            [
+                np.zeros((lanes, each)) if isinstance(each, int) else each.reshape(lanes, -1)
+                for each in entries
+            ]
+            for entries in (inputs, outputs)
+        )
         # zeros, because lanes that only fill the last vector up are computed as well
-        self._slots = np.zeros((program.slots, WIDTH * vectors))
+        self._slots = aligned_zeros((program.slots, WIDTH * vectors))
         self._program = program
         self._places = [
             np.array([(each.ctypes.data, each.shape[1]) for each in arrays], np.int64)

@@ -7,7 +7,6 @@ reason, is simply still missing.
 
 from __future__ import annotations
 
-import os
 import pickle
 import sys
 from collections.abc import Iterator, Sequence
@@ -45,13 +44,6 @@ def divide(jobs: Sequence[CompileJob], processors: int) -> list[list[CompileJob]
         lengths[least] += len(job.assembly)
         shares[least].append(job)
     return shares
-
-
-def processors() -> int:
-    """Return the number of processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 @contextmanager

@@ -273,7 +273,7 @@ class Evidence:
         to it, (N, n_contacts, 3)."""
         plan, places = self.plan, self.plan.task.places()
         over = np.searchsorted(plan.touchdown_times, plan.time + 1e-9, side="right")
-        axes = np.array([ground_axes(places[number].slope) for number in over])
+        axes = np.array([ground_axes(place.slope) for place in places])[over]
         return np.asarray(np.einsum("ncj,nji->nci", plan.contact_force, axes))
 
     @cached_property

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...mathematics.linear_algebra import product
 from ...mathematics.rotations import matrices_of_quaternions
 
 ORDER = [1, 0, 2]
@@ -53,12 +52,15 @@ def euler_rates(angles: Array, angular_velocity: Array) -> Array:
 def rotation(angles: Array) -> Array:
     """Return Ry Rx Rz, from body to world, (..., 3, 3)."""
     (cx, cy, cz), (sx, sy, sz) = _parts(np.cos(angles)), _parts(np.sin(angles))
-    turns = np.zeros((3, *angles.shape, 3))
-    turns[0, ..., 0, 0] = turns[1, ..., 1, 1] = turns[2, ..., 2, 2] = 1.0
-    for turn, one, other, cosine, sine in ((0, 1, 2, cx, sx), (1, 2, 0, cy, sy), (2, 0, 1, cz, sz)):
-        turns[turn, ..., one, one] = turns[turn, ..., other, other] = cosine
-        turns[turn, ..., one, other], turns[turn, ..., other, one] = -sine, sine
-    return product(product(turns[1], turns[0]), turns[2])
+    found = np.empty((*angles.shape, 3))
+    for row, (ahead, aside) in enumerate(
+        ((cy, sy * sx), (0.0 * cy, cx), (-sy, cy * sx))
+    ):  # of Ry Rx
+        found[..., row, 0] = ahead * cz + aside * sz
+        found[..., row, 1] = aside * cz - ahead * sz
+    found[..., 0, 2], found[..., 1, 2], found[..., 2, 2] = sy * cx, -sx, cy * cx
+    found += 0.0  # as in a product of matrices, no zero has a sign
+    return found
 
 
 def angular_motion(angles: Array, rates: Array, accelerations: Array) -> tuple[Array, Array]:
@@ -91,12 +93,14 @@ def cross(a: Array, b: Array) -> Array:
 
 def times(matrices: Array, vectors: Array) -> Array:
     """Multiply matrices (..., 3, 3) by vectors (..., 3)."""
-    return np.asarray(np.add.reduce(matrices * vectors[..., None, :], axis=-1))
+    x, y, z = (each[..., None] for each in _parts(vectors))
+    found = matrices[..., 0] * x + matrices[..., 1] * y + matrices[..., 2] * z
+    return np.asarray(found + 0.0)  # no zero has a sign, as in ``rotation``
 
 
 def times_transposed(matrices: Array, vectors: Array) -> Array:
     """Return the transposed matrices (..., 3, 3) times vectors (..., 3)."""
-    return np.asarray(np.add.reduce(matrices * vectors[..., :, None], axis=-2))
+    return times(np.swapaxes(matrices, -1, -2), vectors)
 
 
 def pose_of(q: Array) -> Array:

@@ -8,9 +8,11 @@ which one is needed are Pinocchio's, with which tests compare the rest.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
@@ -71,15 +73,16 @@ class JointMotion(NamedTuple):
         return position, velocity, (2.0 * bend + 6.0 * u * twist) / (t * t)
 
 
-class Segment(NamedTuple):
-    """Motion over some steps under constant contact forces.
+class Segments(NamedTuple):
+    """Motions over some steps each under constant contact forces, n in all.
 
     Attributes:
-        base, twist: place and quaternion (7,) of the base at the beginning, and its velocity in its axes (6,).
-        angles, speeds: of the joints at the beginning, in the middle and at the end of every step,
-            (2 n_steps + 1, n_joints).
-        force: of the contacts [N, world], (n_contacts, 3).
+        base, twist: place and quaternion (n, 7) of the base at the beginnings, and its velocity in its axes (n, 6).
+        angles, speeds: of the joints at the beginning, in the middle and at the end of every step, of one motion behind
+            the other, (2 n_steps + n, n_joints).
+        force: of the contacts [N, world], (n, n_contacts, 3).
         steps: how long every step is [s], (n_steps,).
+        counts: the numbers of steps, (n,).
     """
 
     base: Array
@@ -88,6 +91,12 @@ class Segment(NamedTuple):
     speeds: Array
     force: Array
     steps: Array
+    counts: NDArray[np.int64]
+
+    @classmethod
+    def joined(cls, parts: Sequence[Segments]) -> Segments:
+        """Return some of them in a row."""
+        return cls(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 class FeetStates(NamedTuple):
@@ -216,66 +225,66 @@ class ExactDynamics:
         """Return what a reference of the controller holds of n states."""
         pin, model, data = self.pin, self.model, self.data
         count, feet = len(position), len(self.sole_frames)
-        place, points = (count, 3), (count, len(self.contact_frames), 3)
-        of_feet, angle = (count, feet, 3), (count, feet)
-        shapes = (place, place, place, points, of_feet, of_feet, angle, angle)
-        found = FeetStates(*(np.empty(shape) for shape in shapes))
-        columns = np.empty((count, 6, model.nv))
-        turns = np.empty((count, feet, 3, 3))
-        base = np.empty((count, 3, 3))
-        # What Pinocchio places is written in memory that stays, which is looked up once.
-        com, moved, screws = data.com[0], data.hg, data.J
-        linear, angular = moved.linear, moved.angular
-        of_contacts = [data.oMf[frame].translation for frame in self.contact_frames]
-        of_soles = [data.oMf[frame].translation for frame in self.sole_frames]
-        of_turns = [data.oMf[frame].rotation for frame in self.sole_frames]
-        of_base = data.oMi[1].rotation
+        # What Pinocchio computes is written in memory that stays. There the frames follow each other, each with the
+        # columns of its rotation and its place.
+        first, second = (data.oMf[k].rotation.T for k in range(2))
+        apart = second.ctypes.data - first.ctypes.data
+        read = (
+            data.com[0], data.hg.linear, data.hg.angular, data.oMi[1].rotation[:, 0], data.J,
+            as_strided(first, (len(data.oMf), 4, 3), (apart, 24, 8), writeable=False),
+        )  # fmt: skip
+        found = [np.empty((count, *each.shape)) for each in read]
         for i, (q, v) in enumerate(zip(position, velocity, strict=True)):
             pin.computeCentroidalMomentum(model, data, q, v)
             pin.computeJointJacobians(model, data)
             pin.updateFramePlacements(model, data)
-            found.com[i], found.com_velocity[i], found.momentum[i] = com, linear, angular
-            found.points[i] = self._contact_places() if self.balls else of_contacts
-            found.soles[i], turns[i], base[i], columns[i] = of_soles, of_turns, of_base, screws
-        found.yaw[:], found.pitch[:] = self._angles(turns, base)
-        up = turns[..., 2]
-        found.com_velocity[:] /= self.mass
+            for each, now in zip(found, read, strict=True):
+                each[i] = now
+        com, linear, angular, base, columns, frames = found
+        contacts, soles = frames[:, self.contact_frames], frames[:, self.sole_frames]
+        points, places, up = contacts[:, :, 3], soles[:, :, 3], soles[:, :, 2]
+        yaw, pitch = self._angles(soles[:, :, 0], base)
         rates = np.empty((count, feet, 6))
         for foot, moving in enumerate(self._foot_columns):
             # Of the columns seen from the world's origin those at the sole.
             jacobian = np.zeros(columns.shape)
             own = columns[:, :, moving]
             jacobian[:, 3:, moving] = own[:, 3:]
-            arm = found.soles[:, foot, :, None]
+            arm = places[:, foot, :, None]
             lever = arm[:, AFTER] * own[:, [5, 3, 4]] - arm[:, BEFORE] * own[:, [4, 5, 3]]
             jacobian[:, :3, moving] = own[:, :3] - lever
             rates[:, foot] = np.add.reduce(jacobian * velocity[:, None, :], axis=-1)
-        found.sole_velocity[:] = rates[:, :, :3]
         for ball in self.balls:
-            found.soles[:, ball.foot] = found.points[:, ball.point]
+            points[:, ball.point] += ball.radius * (
+                contacts[:, ball.point, 2] - np.array([0.0, 0.0, 1.0])
+            )
+            places[:, ball.foot] = points[:, ball.point]
             # The lowest point moves as the centre does, which is above the sole at the zero pose.
             turn = rates[:, ball.foot, 3:]
-            found.sole_velocity[:, ball.foot] += ball.radius * cross(turn, up[:, ball.foot])
-        return found
+            rates[:, ball.foot, :3] += ball.radius * cross(turn, up[:, ball.foot])
+        return FeetStates(
+            com, linear / self.mass, angular, points, places, rates[:, :, :3], yaw, pitch
+        )
 
     def foot_angles(self) -> tuple[Array, Array]:
         """Return the heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated last. A ball
         has none of its own: it has the base's heading and no pitch.
         """
-        turns = [self.data.oMf[frame].rotation for frame in self.sole_frames]
+        ahead = [self.data.oMf[frame].rotation[:, 0] for frame in self.sole_frames]
         yaw, pitch = self._angles(
-            np.array(turns).reshape(1, -1, 3, 3), np.array(self.data.oMi[1].rotation)[None]
+            np.array(ahead).reshape(1, -1, 3), np.array(self.data.oMi[1].rotation[:, 0])[None]
         )
         return yaw[0], pitch[0]
 
-    def _angles(self, turns: Array, base: Array) -> tuple[Array, Array]:
-        """Return the same, both (n, n_feet), of feet (n, n_feet, 3, 3) and a base (n, 3, 3) turned like that."""
-        ahead = turns[..., 0]
-        each, shape = ahead.reshape(-1, 3).tolist(), ahead.shape[:-1]
-        yaw = np.array([math.atan2(y, x) for x, y, _ in each]).reshape(shape)
-        pitch = np.array([math.atan2(-z, math.hypot(x, y)) for x, y, z in each]).reshape(shape)
+    def _angles(self, ahead: Array, base: Array) -> tuple[Array, Array]:
+        """Return the same, both (n, n_feet), of the first axes of feet (n, n_feet, 3) and of a base (n, 3)."""
+        x, y, down = (
+            each.ravel().tolist() for each in (ahead[..., 0], ahead[..., 1], -ahead[..., 2])
+        )
+        yaw = np.array([*map(math.atan2, y, x)]).reshape(ahead.shape[:-1])
+        pitch = np.array([*map(math.atan2, down, map(math.hypot, x, y))]).reshape(yaw.shape)
         for ball in self.balls:
-            yaw[:, ball.foot], pitch[:, ball.foot] = np.arctan2(base[:, 1, 0], base[:, 0, 0]), 0.0
+            yaw[:, ball.foot], pitch[:, ball.foot] = np.arctan2(base[:, 1], base[:, 0]), 0.0
         return yaw, pitch
 
     def _contact_places(self) -> Array:
@@ -449,25 +458,25 @@ class ExactDynamics:
         count = max(1, int(np.ceil(duration / longest_step - 1e-9)))
         h = duration / count
         angles, speeds, _ = joints.at(np.asarray(0.5 * h * np.arange(2 * count + 1)[:, None]))
-        segment = Segment(q[:7], v[:6], angles, speeds, force, np.full(count, h))
-        places, rates = self.follow([segment])
+        segment = Segments(
+            q[None, :7],
+            v[None, :6],
+            angles,
+            speeds,
+            force[None],
+            np.full(count, h),
+            np.array([count]),
+        )
+        places, rates = self.follow(segment)
         return [(h * (i + 1), places[i], rates[i]) for i in range(count)]
 
-    def follow(self, segments: list[Segment]) -> tuple[Array, Array]:
+    def follow(self, segments: Segments) -> tuple[Array, Array]:
         """Return the states after every step of all segments in turn: (n_steps, n_positions) and (n_steps,
         n_velocities).
         """
-        angles = np.concatenate([one.angles for one in segments])
-        speeds = np.concatenate([one.speeds for one in segments])
-        steps = np.concatenate([one.steps for one in segments])
-        counts = np.array([len(one.steps) for one in segments])
+        base, twist, angles, speeds, force, steps, counts = segments
         first = np.concatenate([[0], np.cumsum(counts)])
         of_step = np.repeat(np.arange(len(counts)), counts)
-        force = np.array([one.force for one in segments])
-        base, twist = (
-            np.array([one.base for one in segments]),
-            np.array([one.twist for one in segments]),
-        )
         seen = self._at_origin(angles, speeds)
         starts, ends = (
             2 * first[:-1] + np.arange(len(counts)),
@@ -551,15 +560,13 @@ def joint_motions(
 
 def half_steps(
     position: Array, velocity: Array, time: Array, force: Array, knots: NDArray[np.int64]
-) -> list[Segment]:
+) -> Segments:
     """Return the intervals of a plan from its states at some knots, each in two steps."""
     joints = joint_motions(position, velocity, time, knots)
     quarters = np.arange(5)[:, None, None] * (0.25 * joints.duration)
-    angles, speeds, _ = joints.at(np.asarray(quarters))
-    return [
-        Segment(
-            position[k, :7], velocity[k, :6], angles[:, i], speeds[:, i], force[k],
-            np.full(2, 0.5 * float(time[k + 1] - time[k])),
-        )
-        for i, k in enumerate(knots.tolist())
-    ]  # fmt: skip
+    angles, speeds, _ = (each.swapaxes(0, 1) for each in joints.at(np.asarray(quarters)))
+    return Segments(
+        position[knots, :7], velocity[knots, :6],
+        angles.reshape(-1, angles.shape[2]), speeds.reshape(-1, speeds.shape[2]), force[knots],
+        np.repeat(0.5 * (time[knots + 1] - time[knots]), 2), np.full(len(knots), 2),
+    )  # fmt: skip

@@ -21,7 +21,7 @@ import numpy as np
 
 from ...mathematics.constants import GRAVITY
 from ...robots.description import ContactPoint, Joint, Link, RobotDescription
-from ...robots.kinematics import ball_feet
+from ...robots.kinematics import ball_feet, inertia_tensor
 from ...robots.welding import HeldLoad
 from .symmetry import limbs_of
 
@@ -107,11 +107,6 @@ def joint_rotation(joint: Joint, angle: Expression) -> Expression:
     rotation[first, first] = rotation[second, second] = cosine
     rotation[first, second], rotation[second, first] = -sine, sine
     return rotation
-
-
-def inertia_tensor(link: Link | HeldLoad) -> np.ndarray[Any, np.dtype[np.float64]]:
-    xx, yy, zz, xy, xz, yz = link.inertia
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 class SymbolicModel:
@@ -326,7 +321,7 @@ class SymbolicModel:
             arm = centre - ca.DM(list(load.origin))
             lifted = pulls[load.link] + ca.cross(turn, centre)
             force = load.mass * (lifted + ca.cross(spin, ca.cross(spin, centre)))
-            tensor = ca.DM(inertia_tensor(load))
+            tensor = ca.DM(inertia_tensor(load.inertia))
             moment = ca.mtimes(tensor, turn) + ca.cross(spin, ca.mtimes(tensor, spin))
             moment = moment + ca.cross(arm, force)
             for joint in load.carried:
@@ -381,7 +376,7 @@ class SymbolicModel:
 
         centre = ca.DM(list(link.com))
         force = link.mass * (pull + ca.cross(turn, centre) + ca.cross(spin, ca.cross(spin, centre)))
-        tensor = ca.DM(inertia_tensor(link))
+        tensor = ca.DM(inertia_tensor(link.inertia))
         moment = (
             ca.mtimes(tensor, turn)
             + ca.cross(spin, ca.mtimes(tensor, spin))
@@ -484,5 +479,5 @@ def _own(model: SymbolicModel, name: str, spin: Expression, speed: Expression) -
     link = model.robot.link(name)
     centre = ca.DM(list(link.com))
     linear = link.mass * (speed + ca.cross(spin, centre))
-    angular = ca.mtimes(ca.DM(inertia_tensor(link)), spin) + ca.cross(centre, linear)
+    angular = ca.mtimes(ca.DM(inertia_tensor(link.inertia)), spin) + ca.cross(centre, linear)
     return _SubtreeMomentum(link.mass, link.mass * centre, linear, angular)

@@ -35,8 +35,8 @@ from .structure import Structure
 
 BODY_CLEARANCE = 0.002
 """m; what a body between two knots may come nearer to a step than at them."""
-LEADING = ("contact", "take_off", "air", "obstacle")
-"""The pieces that depend on where the task leads."""
+LEADING = ("take_off", "air", "obstacle")
+"""The pieces whose bounds depend on where the task leads."""
 Rows = tuple[str, int, float, float]
 """Constraint rows that follow each other: their family, their number and their bounds."""
 
@@ -182,6 +182,9 @@ class ProblemBuilder:
             row_lower=other.row_lower, row_upper=other.row_upper, parameters=other.parameters,
             families=other.families,
         )  # fmt: skip
+        # On level ground the height that feet keep does not follow from where the jump leads.
+        heights = [place.z for each in (self, other) for place in each.structure.places]
+        level = not self.leans and not any(heights)
         for k, problem_phase in enumerate(self.of_knot):
             begins = problem_phase.place == 0 and not problem_phase.flies
             if not begins:
@@ -189,7 +192,9 @@ class ProblemBuilder:
                 if not problem_phase.impact:
                     other._set(problem_phase.piece, k, nominal=other.nominal(k))
             for name in self.assembly.knots[k].pieces:
-                if name in LEADING and not (begins and name == "contact"):
+                if name == "contact" and not begins:
+                    other._place_feet(k)
+                elif name in LEADING and not (level and name == "air"):
                     other._fill(name, k)
         end = len(self.of_knot)
         other._give(end)
@@ -355,10 +360,12 @@ class ProblemBuilder:
         }
 
     def nominal(self, k: int) -> Array:
-        """Return the posture that the cost prefers."""
-        if k not in self._nominal:
-            self._nominal[k] = self.coordinates.reduce(self.problem.posture(k))
-        return self._nominal[k]
+        """Return the posture that the cost prefers; on the ground it is that of the first knot there."""
+        problem_phase = self.structure.phase_at(k)
+        key = k if problem_phase.flies else -1 - problem_phase.place
+        if key not in self._nominal:
+            self._nominal[key] = self.coordinates.reduce(self.problem.posture(k))
+        return self._nominal[key]
 
     def _fill_stance(self, k: int) -> None:
         weights, share, problem_phase = self.task.weights, self.coordinates.share, self.of_knot[k]
@@ -375,8 +382,10 @@ class ProblemBuilder:
         """Return the parameter of a piece on ground that leans: the axes of forces, and of feet where these have that
         heading.
         """
+        if not self.leans:
+            return {}
         axes = ground_axes(self.stances[problem_phase.place].slope, heading)
-        return {"axes": axes.ravel(order="F")} if self.leans else {}
+        return {"axes": axes.ravel(order="F")}
 
     def _cones(self) -> Rows:
         cones = 2 * (len(self.coordinates.axes) - 1) * len(self.coordinates.contacts)
@@ -399,12 +408,7 @@ class ProblemBuilder:
 
     def _fill_contact(self, k: int) -> None:
         problem_phase = self.of_knot[k]
-        stance = self.stances[problem_phase.place]
-        places = stance.footholds[list(self.coordinates.contacts)].ravel()
-        heading = [np.cos(stance.heading), np.sin(stance.heading)]
-        self._set(
-            "contact", k, place=places, heading=heading, **self._axes(problem_phase, stance.heading)
-        )
+        self._place_feet(k)
         feet = self.pieces["contact"].rows // 2
         speeds = [("foot velocity", feet, 0.0, 0.0)]
         if problem_phase.impact:  # hits the ground from above
@@ -413,6 +417,14 @@ class ProblemBuilder:
             of_point.append(("foot velocity", 1, -down, np.inf))
             speeds = of_point * len(self.coordinates.contacts)
         self._rows("contact", k, [*speeds, ("footholds", feet, 0.0, 0.0)])
+
+    def _place_feet(self, k: int) -> None:
+        """Tell where the feet stand."""
+        stance = self.stances[self.of_knot[k].place]
+        places = stance.footholds[list(self.coordinates.contacts)].ravel()
+        heading = [np.cos(stance.heading), np.sin(stance.heading)]
+        axes = self._axes(self.of_knot[k], stance.heading)
+        self._set("contact", k, place=places, heading=heading, **axes)
 
     def _fill_obstacle(self, k: int) -> None:
         hop, place, edge = self.structure.hop_at(k)

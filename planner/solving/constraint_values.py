@@ -6,30 +6,12 @@ belongs. The values are the bits of ``Assembly.functions``.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from ...mathematics.arrays import Array, Indices
+from ...mathematics.arrays import Array
 from ...mathematics.compiling.lanes import Lanes
 from ..models.interpreted import InterpretedFunction
 from ..problem.assembly import Assembly
-
-
-class _Piece(NamedTuple):
-    """A piece's function on its knots.
-
-    Attributes:
-        lanes: the function.
-        columns: which variables it takes, by knot.
-        parameters: which of all parameters are its own.
-        found: the result that is needed.
-    """
-
-    lanes: Lanes
-    columns: Indices
-    parameters: slice
-    found: Array
 
 
 class ConstraintValues:
@@ -38,7 +20,7 @@ class ConstraintValues:
     Attributes:
         starts, rows: where the Jacobian has entries: the columns' starts and the entries' rows.
         values: the rows' values at the variables of the last ``evaluate``.
-        entries: the Jacobian's entries at those of the last ``differentiate``.
+        entries: the Jacobian's entries at the variables of the last ``evaluate`` before ``differentiate``.
     """
 
     def __init__(self, assembly: Assembly) -> None:
@@ -48,47 +30,53 @@ class ConstraintValues:
         self._row_sources = assembly.row_sources()
         self._linear_rows, self._linear_columns, self._signs = assembly.linear_terms
         self.values, self.entries = np.zeros(assembly.constraints), np.zeros(pattern.nnz())
-        self._of_rows = _pieces(assembly, "value")
-        self._of_jacobian = _pieces(assembly, "jacobian")
-        self._piece_rows = np.zeros(sum(each.found.size for each in self._of_rows) + 1)
-        count = sum(each.found.size for each in self._of_jacobian)
-        self._piece_entries = np.concatenate([np.zeros(count), self._signs])
+        # What all pieces take and give lies side by side.
+        self._columns = np.concatenate(
+            [assembly.piece_columns[name].ravel() for name in assembly.users]
+        )
+        self._variables = np.zeros(len(self._columns))
+        self._parameters = np.zeros(assembly.parameters)
+        self._of_rows, self._piece_rows = self._lanes(assembly, "value", np.zeros(1))
+        self._of_jacobian, self._piece_entries = self._lanes(assembly, "jacobian", self._signs)
+
+    def _lanes(self, assembly: Assembly, kind: str, behind: Array) -> tuple[list[Lanes], Array]:
+        """Return all pieces' functions of a kind on their knots, and the second result of each of them, with what comes
+        behind.
+        """
+        users = assembly.users
+        functions: list[InterpretedFunction] = [getattr(assembly.pieces[n], kind) for n in users]
+        sizes = [
+            len(users[n]) * len(f.outputs[1].rows) for n, f in zip(users, functions, strict=True)
+        ]
+        found = np.concatenate([np.zeros(sum(sizes)), behind])
+        *results, _ = np.split(found, np.cumsum(sizes))
+        *given, _ = np.split(
+            self._variables, np.cumsum([assembly.piece_columns[n].size for n in users])
+        )
+        return [
+            Lanes(
+                function.program, len(users[name]),
+                (taken, self._parameters[assembly.piece_parameters[name]]),
+                (len(function.outputs[0].rows), own),
+            )
+            for name, function, taken, own in zip(users, functions, given, results, strict=True)
+        ], found  # fmt: skip
 
     def set_parameters(self, parameters: Array) -> None:
         """Take a problem's parameters for what follows."""
-        for piece in (*self._of_rows, *self._of_jacobian):
-            own = piece.lanes.inputs[1]
-            own[:] = parameters[piece.parameters].reshape(own.shape)
+        self._parameters[:] = parameters
 
     def evaluate(self, variables: Array) -> None:
         """Compute the rows' values."""
-        _evaluate(self._of_rows, variables, self._piece_rows)
+        np.take(variables, self._columns, out=self._variables, mode="clip")
+        for lanes in self._of_rows:
+            lanes.run()
         terms = self._signs * variables[self._linear_columns]
         linear = np.bincount(self._linear_rows, terms, len(self.values))
         np.add(self._piece_rows[self._row_sources], linear, out=self.values)
 
-    def differentiate(self, variables: Array) -> None:
-        """Compute the Jacobian's entries, which takes ten times as long."""
-        _evaluate(self._of_jacobian, variables, self._piece_entries)
+    def differentiate(self) -> None:
+        """Compute the Jacobian's entries where the values were computed, which takes ten times as long."""
+        for lanes in self._of_jacobian:
+            lanes.run()
         np.take(self._piece_entries, self._entry_sources, out=self.entries, mode="clip")
-
-
-def _evaluate(pieces: list[_Piece], variables: Array, found: Array) -> None:
-    """Put what all pieces give side by side."""
-    place = 0
-    for piece in pieces:
-        np.take(variables, piece.columns, out=piece.lanes.inputs[0], mode="clip")
-        piece.lanes.run()
-        found[place : place + piece.found.size] = piece.found.reshape(-1)
-        place += piece.found.size
-
-
-def _pieces(assembly: Assembly, kind: str) -> list[_Piece]:
-    """Return all pieces' functions of a kind on their knots; of both kinds the second result is needed."""
-    found = []
-    for name, users in assembly.users.items():
-        function: InterpretedFunction = getattr(assembly.pieces[name], kind)
-        columns, parameters = assembly.piece_columns[name], assembly.piece_parameters[name]
-        lanes = function.lanes(len(users))
-        found.append(_Piece(lanes, columns, parameters, lanes.outputs[1]))
-    return found

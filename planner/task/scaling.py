@@ -50,14 +50,14 @@ def _text_of(robot: RobotDescription) -> str:
 
 def per_robot(function: _OfRobot[_Parameters, _Result]) -> _OfRobot[_Parameters, _Result]:
     """Call a function once for the same robot and arguments. What it returns must not be changed."""
-    kept: OrderedDict[str, _Result] = OrderedDict()
+    kept: OrderedDict[tuple[str, str], _Result] = OrderedDict()
 
     @wraps(function)
     def called(
         robot: RobotDescription, *args: _Parameters.args, **kwargs: _Parameters.kwargs
     ) -> _Result:
         # A description is not hashable, and two of the same content may be different objects.
-        key = f"{_text_of(robot)} {args} {sorted(kwargs.items())}"
+        key = _text_of(robot), f"{args} {sorted(kwargs.items())}"
         if key not in kept:
             kept[key] = function(robot, *args, **kwargs)
         kept.move_to_end(key)

@@ -1,4 +1,4 @@
-"""What two readings of a robot differ in: by how much at most, what is an error, and what differs on purpose."""
+"""Differences of two readings of a robot: by how much at most, which are errors, and which are on purpose."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ..validation import DescriptionError
 
+STATES = 3
+"""Random states at which mass matrix and bias forces are compared."""
 SAME = 1e-7
 """Share by which two readings may differ: a description has eleven digits, and products of a tensor fewer."""
 FIX = "this is a mistake of the importer, not of the file: please report it with the file"
@@ -103,12 +105,6 @@ def unread(compared: Iterable[Differences]) -> list[str]:
         for each in compared
         if each.why
     ]
-
-
-def tensor(link: dict[str, Any]) -> Array:
-    """Return the inertia (3, 3) [kg m^2] of a link's data."""
-    xx, yy, zz, xy, xz, yz = link["inertia"]
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def together(bodies: Sequence[tuple[float, Array, Array]]) -> tuple[float, Array, Array]:

@@ -13,13 +13,12 @@ from ..importing.build import SHARE as LIGHT_SHARE
 from ..importing.build import split_share
 from ..importing.inertials import mujoco_remarks
 from ..importing.raw_model import Reference
-from .differences import SAME, Differences, tensor, together
+from ..kinematics import inertia_tensor
+from .differences import SAME, STATES, Differences, together
 
 if TYPE_CHECKING:
     from .file_robot import FileRobot
 
-STATES = 3
-"""Random states at which mass matrix and bias forces are compared."""
 SPLIT, LENT = 2e-5, 0.02
 """Shares by which dynamics may differ of robots with bodies that are several links, and of robots with links that have a
 little of another one's mass."""
@@ -216,7 +215,7 @@ def _compare_links(ours: FileRobot, state: _State, found: Differences) -> float:
         if members == [built.base] and built.base_joint == "fixed":
             continue  # what is bolted to the world may have any mass
         mine = together([
-            (links[n]["mass"], np.array(links[n]["com"]) + origins[n], tensor(links[n])) for n in members
+            (links[n]["mass"], np.array(links[n]["com"]) + origins[n], inertia_tensor(links[n]["inertia"])) for n in members
         ])  # fmt: skip
         other = together([part for n in members for part in theirs.get(n, [])])
         called = f"link {root}" if len(members) == 1 else f"links {' and '.join(members)} together"

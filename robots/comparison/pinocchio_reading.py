@@ -11,12 +11,11 @@ import numpy as np
 from ...files.problems import listing
 from ..importing.inertials import one_line
 from ..importing.urdf_text import XmlFile
-from .differences import Differences
+from .differences import STATES, Differences
 
 if TYPE_CHECKING:
     from .file_robot import FileRobot
 
-STATES = 3
 MADE_UP = 0.02
 """Share by which dynamics may differ of robots with links that have a little of another one's mass or inertia."""
 

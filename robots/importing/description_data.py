@@ -27,7 +27,7 @@ from ..comparison.compare import compare_with_file
 from ..comparison.differences import Differences
 from ..robot_description import SLIDE_UNITS, Joint, Link, RobotDescription
 from ..validation import DescriptionError, RobotError, find_errors
-from ..validation.errors import nearest
+from ..validation.errors import Draft, nearest
 from ..validation.find_errors import shown
 from .build import BodyFrame, LinkTree, bolted, build, tidy
 from .looks import link_looks
@@ -44,17 +44,8 @@ ROOM = 0.1
 """Distance from a limit at which joints stand that cannot be at zero [rad, m]."""
 
 
-class Overlay:
+class Overlay(Draft):
     """The content of a short YAML, and what is wrong with it."""
-
-    def __init__(self, data: Mapping[str, Any]) -> None:
-        self.data = data
-        self.errors: list[DescriptionError] = []
-
-    def add(self, path: tuple[str | int, ...], message: str, expected: str = "", found: str = "",
-            fix: str = "") -> None:  # fmt: skip
-        """Note a fault."""
-        self.errors.append(DescriptionError(path, message, expected, found, fix))
 
     def mapping(self, key: str) -> Mapping[str, Any]:
         """Return the mapping under a key; empty, and a fault, where it is something else."""

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Array
-from .raw_model import NOTHING, Inertial, Reference, full_tensor
+from ..kinematics import inertia_tensor
+from .raw_model import NOTHING, Inertial, Reference
 
 LIGHT = 1e-13
 """Mass [kg] and inertia [kg m^2] of a stand-in for a body that MuJoCo refuses, too little to change a robot."""
@@ -59,7 +60,7 @@ def written_inertials(spec: Any, is_urdf: bool) -> Written:
         elif math.isnan(body.fullinertia[0]):
             found[body.name] = (float(body.mass), np.diag(body.inertia))
         else:
-            found[body.name] = (float(body.mass), full_tensor(np.array(body.fullinertia)))
+            found[body.name] = (float(body.mass), inertia_tensor(body.fullinertia))
     return found
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from ...files.problems import listing
 from .left_out import MOST, by_value
 from .urdf_text import XmlFile
+from .urdf_words import read_number
 
 Said = tuple[str, Any]
 """Name of a link or joint, and an element that describes it."""
@@ -138,7 +139,7 @@ def _soft_limits(file: XmlFile) -> Iterator[str]:
             continue
         ends = [(soft.get(f"soft_{key}_limit"), hard.get(key)) for key in ("lower", "upper")]
         if any(given is not None and _differ(given, limit) for given, limit in ends):
-            low, high = (f"{_number(given or limit):.4g}" for given, limit in ends)
+            low, high = (f"{read_number(given or limit):.4g}" for given, limit in ends)
             yield f"{low} to {high} ({joint.get('name', '')})"
 
 
@@ -159,19 +160,12 @@ def _values(said: Iterable[Said], words: Iterable[str], called: Any = None) -> s
 def _text(element: Any) -> str:
     """Return an element's content, its text or its ``value``; numbers without zeros at their end."""
     text = str(element.get("value") or element.text or "").strip()
-    number = _number(text)
+    number = read_number(text)
     return text if math.isnan(number) else f"{number:g}"
 
 
-def _number(text: str | None) -> float:
-    try:
-        return float(text or "")
-    except ValueError:
-        return math.nan
-
-
 def _differ(one: str, other: str | None) -> bool:
-    return abs(_number(one) - _number(other)) > 1e-9 if other is not None else True
+    return abs(read_number(one) - read_number(other)) > 1e-9 if other is not None else True
 
 
 def _closes(element: Any) -> bool:

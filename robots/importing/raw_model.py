@@ -53,12 +53,6 @@ def joined(bodies: list[Inertial]) -> Inertial:
     return Inertial(mass, com, inertia)
 
 
-def full_tensor(values: Array) -> Array:
-    """Return the tensor (3, 3) of xx, yy, zz, xy, xz, yz."""
-    xx, yy, zz, xy, xz, yz = values
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
 @dataclass(frozen=True)
 class RawJoint:
     """A joint of the file; ``anchor`` [m] and ``axis`` in the world at the zero of all joints.

@@ -83,7 +83,7 @@ def turned_by_degrees(part: ElementTree.Element) -> Iterator[tuple[str, str]]:
     degrees beyond a turn.
     """
     for origin in part.iter("origin"):
-        angles = [_number(text) for text in (origin.get("rpy") or "").split()]
+        angles = [read_number(text) for text in (origin.get("rpy") or "").split()]
         if any(abs(a) > TURN and a % ROUND == 0.0 for a in angles):
             radians = " ".join(f"{math.radians(a):.9g}" for a in angles)
             yield f'rpy="{origin.get("rpy")}"', f'rpy="{radians}"'
@@ -95,7 +95,7 @@ def limited_by_degrees(joint: ElementTree.Element) -> str:
     limit = joint.find("limit")
     if limit is None or joint.get("type") != "revolute":
         return ""
-    ends = {key: _number(limit.get(key)) for key in ("lower", "upper") if limit.get(key)}
+    ends = {key: read_number(limit.get(key)) for key in ("lower", "upper") if limit.get(key)}
     if not any(abs(a) > 2.0 * TURN and a % ROUND == 0.0 for a in ends.values()):
         return ""
     given = " ".join(f'{key}="{limit.get(key)}"' for key in ends)
@@ -103,7 +103,8 @@ def limited_by_degrees(joint: ElementTree.Element) -> str:
     return f"limits of joint {joint.get('name', '')} look like degrees, {given}, and a URDF's are radians; write {radians} if they are"
 
 
-def _number(text: str | None) -> float:
+def read_number(text: str | None) -> float:
+    """Return the number of an attribute; NaN where it is none."""
     try:
         return float(text or "")
     except ValueError:

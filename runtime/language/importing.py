@@ -48,11 +48,6 @@ def without_imports() -> Iterator[None]:
         _ALLOWED.reset(token)
 
 
-def is_importing() -> bool:
-    """Return whether modules that files name are imported now."""
-    return _ALLOWED.get()
-
-
 def user_module(module_name: str, folders: Iterable[Path]) -> ModuleType:
     """Import a module from the first of some folders that has it, or else as an installed module.
 

@@ -194,7 +194,7 @@ def _own_module(package: str, class_name: str) -> ModuleType | None:
 
 
 def _is_usable(found: object) -> bool:
-    """Whether a class is one of those that ``blocks_in_packages`` finds, as far as the class shows."""
+    """Return whether a class is one of those that ``blocks_in_packages`` finds, as far as the class shows."""
     return (
         isinstance(found, type)
         and issubclass(found, Block)
@@ -228,8 +228,8 @@ def _class_of(module: ModuleType, class_name: str, name: str) -> type[Block]:
     return found
 
 
-def nearest_names(name: str, folder: Path | None = None, count: int = 3) -> tuple[str, ...]:
-    """Blocks whose names resemble an unknown one, the most similar first; the class counts most.
+def nearest_names(name: str, folder: Path | None = None) -> tuple[str, ...]:
+    """At most three blocks whose names resemble an unknown one, the most similar first; the class counts most.
 
     A name of the form ``module:Class`` means a user's own block, so a block of aloft is proposed
     only if its class has almost the same name.
@@ -249,7 +249,7 @@ def nearest_names(name: str, folder: Path | None = None, count: int = 3) -> tupl
         if similarity >= least:
             scored.setdefault(candidate, similarity + 0.2 * _similarity(package, other_package))
     ordered = sorted(scored, key=lambda each: (-scored[each], each))
-    return tuple(each for each in ordered[:count] if scored[each] >= scored[ordered[0]] - 0.2)
+    return tuple(each for each in ordered[:3] if scored[each] >= scored[ordered[0]] - 0.2)
 
 
 def _parts(name: str) -> tuple[str, str]:

@@ -35,7 +35,6 @@ class Wire(HasSource):
     target: str
     delay: int = 0
     initial: Mapping[str, Any] = field(default_factory=dict)
-    truth_allowed: bool = False
     where: Position | None = None
 
 

@@ -64,9 +64,9 @@ class Unit:
         return self.text or "1"
 
 
-def _base(index: int | None, scale: float = 1.0) -> Unit:
+def _base(index: int | None) -> Unit:
     exponents = tuple(1 if k == index else 0 for k in range(len(BASE_UNITS)))
-    return Unit(exponents, scale, "")
+    return Unit(exponents, 1.0, "")
 
 
 def _derived(scale: float = 1.0, **exponents: int) -> Unit:

@@ -136,6 +136,7 @@ class PeerStates:
         self._phase = PartPhase.HELLO
         self._problem = ""
         self._ended = -1
+        self._ends_alone = False
         self._checked: dict[str, None] = {}
         self._states: dict[str, Mapping[str, Any]] = {}
         self._failed: dict[str, tuple[int, PeerError]] = {}
@@ -281,16 +282,17 @@ class PeerStates:
             self._changed_event.wait(max(0.0, next_time - now))
             self._changed_event.clear()
 
-    def wait_for_rest(self, timeout: float, tick: int) -> None:
+    def wait_for_rest(self, timeout: float, tick: int, *, alone: bool = False) -> None:
         """Report that the actuators here are in damping, and wait until the others have reported
         so.
 
         It never raises, and does not wait for a part that is gone. Where this part could not start,
         it sends the reason until all have heard it. ``tick`` is the first that this part will not
-        run.
+        run. With ``alone`` the others go on, and this part waits only until they have heard of its end.
         """
         end = time.monotonic() + timeout
-        self._phase, self._ended = PartPhase.RESTING, tick
+        self._phase, self._ended, self._ends_alone = PartPhase.RESTING, tick, alone
+        answer = "heard" if alone else "phase"
         next_time = 0.0
         while (now := time.monotonic()) < end:
             if now >= next_time:
@@ -301,7 +303,7 @@ class PeerStates:
                 for name in self.names
                 if name not in self._gone
                 and (self._problem or name in self._states)
-                and self._states.get(name, {}).get("phase", -1) < PartPhase.RESTING
+                and self._states.get(name, {}).get(answer, -1) < PartPhase.RESTING
             ]
             if not waiting:
                 return
@@ -321,6 +323,7 @@ class PeerStates:
             "phase": int(self._phase),
             "problem": self._problem,
             "ended": self._ended,
+            "alone": self._ends_alone,
             "hashes": self._hashes,
             "clock": self._clocks[name].stamp(time.monotonic_ns()),
             "checked": list(self._checked),
@@ -366,7 +369,7 @@ class PeerStates:
                 error = PeerError(f"machine {name!r} {what}: {state['problem']}")
                 error.heard = True
                 self.fail(name, -1, error)
-            elif phase >= PartPhase.RESTING:
+            elif phase >= PartPhase.RESTING and not (state["alone"] and self.started):
                 error = PeerError(f"machine {name!r} has ended its run")
                 self.fail(name, int(state["ended"]), error)
             self._changed_event.set()

@@ -38,9 +38,9 @@ class GraphFile(CommonKeys, SubgraphKeys, GraphSections, GraphValues):
     )
 
 
-def graph_schema(blocks: Mapping[str, type[Block]] | None = None) -> Schema:
-    """Return the schema for graphs of these blocks; by default for all registered blocks."""
-    known = dict(blocks) if blocks is not None else all_blocks()
+def graph_schema() -> Schema:
+    """Return the schema for graphs of all registered blocks."""
+    known = all_blocks()
     schema = GraphFile.model_json_schema(ref_template="#/definitions/{model}")
     definitions: Schema = schema.pop("$defs")
     schema["properties"]["machines"]["additionalProperties"]["pattern"] = endpoint_pattern()

@@ -9,12 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from enum import Enum
 
-from ..language.block import Block
+from ..language.block import STOP_CYCLES, Block
 from ..language.errors import AloftError, RunError
 from .failures import describe
-
-STOP_CYCLES = 5
-"""Rounds of stop cycles: more than one, since a bus may lose a packet."""
 
 
 class LifeState(Enum):

@@ -25,10 +25,10 @@ from contextlib import suppress
 from types import FrameType
 from typing import Any, Self
 
-from ..language.block import Block, Clock
+from ..language.block import STOP_CYCLES, Block, Clock
 from ..language.errors import RunError
 from .failures import Hang, location_of_frames
-from .life_cycle import STOP_CYCLES, LifeCycle, LifeState
+from .life_cycle import LifeCycle, LifeState
 from .pacing import Paced
 from .sink import Sink
 from .ticker import Ticker, hang_text, owner_of

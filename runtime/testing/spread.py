@@ -224,8 +224,6 @@ def run_virtual(
     graph: CheckedGraph,
     travel: Travel,
     phases: Mapping[str, float] | None = None,
-    *,
-    plain: bool = False,
 ) -> VirtualRun:
     """Run a free-running graph for its duration, or until a block requests the end.
 
@@ -233,7 +231,6 @@ def run_virtual(
         graph: with machines; its clock is ignored.
         travel: how long each message takes.
         phases: when the first tick of each machine is, as a share of a period; by default zero.
-        plain: whether nothing is compiled.
 
     Raises:
         AloftError: the graph names no machines, or a part fails.
@@ -249,8 +246,7 @@ def run_virtual(
         for other in part.peers.names:
             part.peers.assume_started(other, parts[other].peers.run)
         part.open_links()
-        if not plain:
-            compile_calls(part.kernel_calls)
+        compile_calls(part.kernel_calls)
         assert name == part.machine
     blocks = [
         block for part in parts.values() for path, block in part.blocks.items()

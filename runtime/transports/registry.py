@@ -80,12 +80,12 @@ def _is_loopback(endpoint: str) -> bool:
         return host == "localhost"
 
 
-def silent_endpoint(endpoint: str, timeout: float = 0.3) -> str:
+def silent_endpoint(endpoint: str) -> str:
     """Find the likely cause of a machine's silence: whether anybody listens at its endpoint. Opens
     a connection and sends nothing."""
     scheme, host, port = _parts(endpoint)
     try:
-        socket.create_connection((host, port), timeout).close()
+        socket.create_connection((host, port), 0.3).close()
     except OSError as error:
         return f"no connection to {endpoint}: {error.strerror or error}"
     keys = "are the keys of this graph's authority? Or does it" if scheme == "tls" else "does it"

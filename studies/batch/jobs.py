@@ -48,6 +48,7 @@ from typing import Any, Self
 
 from ...files.pip_line import pip_line
 from ...processes.child import end_with
+from ...processes.child_process import processors
 from ...runtime.language.errors import AloftError
 
 
@@ -341,13 +342,6 @@ def job_results(
     """Yield the results of one batch of jobs; see ``JobPool``."""
     with JobPool(function, workers=workers, cluster=cluster) as pool:
         yield from pool.results(jobs)
-
-
-def processors() -> int:
-    """Return the number of processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 @cache

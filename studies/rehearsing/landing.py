@@ -168,8 +168,7 @@ def _at_lift_off(runs: Sequence[Touchdown], unit: Array) -> Deviation:
 
 def rehearse_landing(
     path: Path, overrides: Sequence[str], parameters: dict[str, str], answer: Array,
-    momentum_unit: float, *, tries: int = TRIES, seeds: Sequence[int] = SEEDS,
-    on_try: Callable[[str], None] = lambda text: None,
+    momentum_unit: float, *, on_try: Callable[[str], None] = lambda text: None,
 ) -> Rehearsed:  # fmt: skip
     """Rehearse the landing of a graph's plan on all processors; see ``learn_landing``.
 
@@ -183,8 +182,8 @@ def rehearse_landing(
         LoadError: the graph may not run.
         AloftError: a run could not be made.
     """
-    measure = in_all_worlds(path, overrides, parameters, TRIAL, seeds, run_landing, "the landing")
-    return learn_landing(measure, answer, momentum_unit, tries=tries, seeds=seeds, on_try=on_try)
+    measure = in_all_worlds(path, overrides, parameters, TRIAL, SEEDS, run_landing, "the landing")
+    return learn_landing(measure, answer, momentum_unit, on_try=on_try)
 
 
 def run_landing(job: tuple[Path, Sequence[str]]) -> Touchdown:

@@ -16,6 +16,13 @@ from aloft.cli import run
 
 from ..counting import copy_counting
 
+Call = Callable[..., subprocess.CompletedProcess[str]]
+"""The type of ``run_here``."""
+CallJson = Callable[..., dict[str, Any]]
+"""The type of ``run_for_json``."""
+Start = Callable[..., subprocess.Popen[str]]
+"""The type of ``run_elsewhere``."""
+
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -94,18 +101,18 @@ def run_elsewhere(*arguments: str, before: str = "", **environment: str) -> subp
 
 
 @pytest.fixture
-def call() -> Callable[..., subprocess.CompletedProcess[str]]:
+def call() -> Call:
     """See ``run_here``."""
     return run_here
 
 
 @pytest.fixture
-def call_json() -> Callable[..., dict[str, Any]]:
+def call_json() -> CallJson:
     """See ``run_for_json``."""
     return run_for_json
 
 
 @pytest.fixture
-def start() -> Callable[..., subprocess.Popen[str]]:
+def start() -> Start:
     """See ``run_elsewhere``."""
     return run_elsewhere

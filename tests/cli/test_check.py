@@ -1,14 +1,12 @@
 """``aloft check`` and ``aloft doctor``, and the flags of a run that the latter speaks of."""
 
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-Call = Callable[..., subprocess.CompletedProcess[str]]
-CallJson = Callable[..., dict[str, Any]]
+from .conftest import Call, CallJson
 
 
 def test_it_tells_what_the_machine_allows(folder: Path, call: Call, call_json: CallJson) -> None:

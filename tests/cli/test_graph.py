@@ -1,12 +1,10 @@
 """``aloft graph`` as a block diagram in files."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-Call = Callable[..., Any]
+from .conftest import Call
 
 GRAPH = """
 rate: 100 Hz

@@ -6,10 +6,11 @@ import shutil
 import signal
 from collections.abc import Callable
 from pathlib import Path
-from subprocess import Popen
 from typing import Any
 
 import pytest
+
+from .conftest import Start
 
 HERE = Path(__file__).parent
 GRAPH = """\
@@ -18,7 +19,6 @@ clock: {hangs_after: 500 ms}
 blocks:
   arm: {use: "hanging:Hanging", with: {compiled: COMPILED}}
 """
-Start = Callable[..., Popen[str]]
 
 
 @pytest.fixture

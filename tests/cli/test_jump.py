@@ -1,7 +1,5 @@
 """``aloft jump``: what is asked for in words becomes a task, its plan, a run and a recording."""
 
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +11,8 @@ from aloft.planner.library import library
 from aloft.runtime.language.errors import AloftError
 from aloft.studies.trials import trial_settings
 
-Call = Callable[..., subprocess.CompletedProcess[str]]
-CallJson = Callable[..., dict[str, Any]]
+from .conftest import Call, CallJson
+
 BRUCE, _ = graph_of("bruce")
 
 

@@ -1,17 +1,13 @@
 """``aloft jump --learn``: a robot jumps, and each jump is corrected by what those before it have taught."""
 
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from aloft.planner.library.learnt import read_learnt
 from aloft.studies.rehearsing.learning import ladder
 
-Call = Callable[..., subprocess.CompletedProcess[str]]
-CallJson = Callable[..., dict[str, Any]]
+from .conftest import CallJson
 
 
 def test_a_ladder_begins_small_and_ends_half_as_far() -> None:

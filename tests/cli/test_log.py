@@ -2,7 +2,6 @@
 
 import csv
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +10,7 @@ import pytest
 
 import aloft.logs
 
-Call = Callable[..., Any]
-CallJson = Callable[..., dict[str, Any]]
+from .conftest import Call, CallJson
 
 
 @pytest.fixture
@@ -60,8 +58,8 @@ def test_the_whole_way(recorded: Path, call: Call, call_json: CallJson) -> None:
     Path("count.rrd").write_bytes(data[: len(data) * 2 // 3])
     found = call_json("log", "info", "count.rrd")
     assert found["whole"] is False and found["damage"] == []
-    done = call("log", "repair", "count.rrd").stdout
-    assert "count.rrd is mended: it was not closed by who wrote it" in done
+    told = call("log", "repair", "count.rrd").stdout
+    assert "count.rrd is mended: it was not closed by who wrote it" in told
     done = call_json("log", "repair", "count.rrd")
     assert done["closed"] is True and done["size_before"] == done["size"]
     assert call_json("log", "info", "count.rrd")["ticks"] == done["ticks"] <= 100

@@ -4,15 +4,13 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from aloft.runtime.loading import check
 
-Call = Callable[..., Any]
+from .conftest import Call
 
 
 @pytest.fixture

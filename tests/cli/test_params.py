@@ -6,17 +6,14 @@ import signal
 import subprocess
 import time
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from aloft.extensions.studio.live.live_run import LiveRun
 
-Call = Callable[..., subprocess.CompletedProcess[str]]
-CallJson = Callable[..., dict[str, Any]]
-Start = Callable[..., subprocess.Popen[str]]
+from .conftest import Call, CallJson, Start
 
 GRAPH = """
 rate: 200 Hz

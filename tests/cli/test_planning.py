@@ -4,7 +4,6 @@ too, and nothing lost however it ends."""
 import json
 import os
 import signal
-import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -15,9 +14,7 @@ import pytest
 from aloft.planner.task.plan import read_plan
 
 from ..local_cluster import local_cluster
-
-CallJson = Callable[..., dict[str, Any]]
-Start = Callable[..., subprocess.Popen[str]]
+from .conftest import CallJson, Start
 
 MANY = 16
 """Tasks, so that some are left when a busy machine lets the test see the first plan."""

@@ -1,8 +1,6 @@
 """``aloft plot``: in the terminal and into files, by signal, port and element."""
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +8,8 @@ import pytest
 from aloft.cli.plot import in_terminal
 from aloft.plotting import Curve, Panel, panels_svg
 
-Call = Callable[..., Any]
+from .conftest import Call
+
 GRAPH = """
 rate: 100 Hz
 duration: 1 s

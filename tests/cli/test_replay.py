@@ -4,15 +4,11 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-Call = Callable[..., subprocess.CompletedProcess[str]]
-CallJson = Callable[..., dict[str, Any]]
-Start = Callable[..., subprocess.Popen[str]]
+from .conftest import Call, CallJson, Start
 
 GRAPH = """
 rate: 100 Hz

@@ -1,16 +1,11 @@
 """``aloft robot stand``: any robot stands or squats in its trial, straight from its file."""
 
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from .conftest import Call, CallJson
 from .test_jump import STICKS
-
-Call = Callable[..., subprocess.CompletedProcess[str]]
-CallJson = Callable[..., dict[str, Any]]
 
 
 @pytest.mark.long

@@ -2,18 +2,13 @@
 
 import json
 import signal
-import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-Call = Callable[..., subprocess.CompletedProcess[str]]
-CallJson = Callable[..., dict[str, Any]]
-Start = Callable[..., subprocess.Popen[str]]
+from .conftest import Call, CallJson, Start
 
 
 def test_run_prints_metrics_times_and_verdict(folder: Path, call: Call) -> None:

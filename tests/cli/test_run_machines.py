@@ -366,3 +366,31 @@ def test_a_part_that_prints_much_and_one_that_hangs(
         outputs, received = run_machines._wait_for_all(running)
         assert len(outputs["print_much"]) == 1_000_001 and outputs["hang"] == b"I hang\n"
         assert running["hang"].wait(60.0) == -signal.SIGKILL and not received
+
+
+VIEWED = """
+rate: 200 Hz
+duration: 300 ms
+clock: {kind: paced}
+links: {mode: free, max_age: 60 s, late: hold}
+machines: {onboard: tcp/127.0.0.1:7450, ground: tcp/127.0.0.1:7451}
+blocks:
+  robot: {use: "pieces:Robot", with: {pace: 0.02}, in: {u: {value: 0.0}}}
+  viewer: {use: "pieces:Controller", in: {u: robot.y}, on: ground}
+"""
+
+
+@pytest.mark.long
+def test_a_free_part_from_which_nobody_reads_does_not_cut_the_others_short(here: Path) -> None:
+    """Beside two busy loops; a tick of the robot takes four periods, so the viewer, which only reads,
+    is at its end long before it."""
+    (here / "viewed.yaml").write_text(VIEWED)
+    with ExitStack() as stack:
+        for _ in range(2):
+            loop = subprocess.Popen([sys.executable, "-c", "while True: pass"])
+            stack.callback(loop.wait)
+            stack.callback(loop.kill)
+        found = run_parts_for_json("run", "viewed.yaml", "--local", "--no-record")
+    assert found["success"], found["reason"]
+    assert [part["ticks"] for part in found["machines"].values()] == [60, 60]
+    assert len((here / "damping.txt").read_text().splitlines()) == 5

@@ -3,18 +3,13 @@
 import json
 import os
 import signal
-import subprocess
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from pyarrow import parquet
 
-Call = Callable[..., subprocess.CompletedProcess[str]]
-CallJson = Callable[..., dict[str, Any]]
-Start = Callable[..., subprocess.Popen[str]]
+from .conftest import Call, CallJson, Start
 
 STUDY = """
 graph: count.yaml

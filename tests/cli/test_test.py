@@ -1,14 +1,10 @@
 """``aloft test``: blocks keep their promises, a recording becomes a test, pytest runs."""
 
-import subprocess
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-Call = Callable[..., subprocess.CompletedProcess[str]]
-CallJson = Callable[..., dict[str, Any]]
+from .conftest import Call, CallJson
 
 
 def test_blocks_and_graphs(folder: Path, call: Call, call_json: CallJson) -> None:

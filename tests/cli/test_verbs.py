@@ -4,7 +4,6 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +19,7 @@ from aloft.cli.verbs import PANELS, help_page
 from aloft.logs.file.code import code_of, remember
 from aloft.runtime.loading import flatten
 
-Call = Callable[..., subprocess.CompletedProcess[str]]
-CallJson = Callable[..., dict[str, Any]]
-Start = Callable[..., subprocess.Popen[str]]
+from .conftest import Call, CallJson, Start
 
 ROOT = Path(__file__).parent.parent.parent
 HEAVY = {

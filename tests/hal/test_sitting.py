@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from aloft.blocks.signals import CommandMode, DrivePhase
-from aloft.hal.robot import STOP_CYCLES, Robot
+from aloft.hal.robot import Robot
 from aloft.hal.simulated.mujoco_robot import MujocoRobot
 from aloft.hal.sitting import sitting_path
 from aloft.hal.twin.twin_robot import TwinRobot
 from aloft.robots.description import find_robot
+from aloft.runtime.language.block import STOP_CYCLES
 from aloft.runtime.testing.bench import BlockBench
 
 ROBOT = find_robot("bruce")

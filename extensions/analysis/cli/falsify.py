@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ....cli.shared.options import Cluster, JsonBesideTables, Workers
+from ....cli.shared.options import Cluster, JsonBesideTables, RunsFolder, Workers
 from ....cli.shared.output import (
     console,
     errors_reported,
@@ -48,9 +48,7 @@ def falsify(
             "--test", help="With --keep: the test; by default test_NAME_falsified.py in tests/."
         ),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for the runs; by default results/NAME.")
-    ] = None,
+    out: RunsFolder = None,
     workers: Workers = 0,
     cluster: Cluster = "",
     as_json: JsonBesideTables = False,
@@ -58,7 +56,7 @@ def falsify(
     """Search the worst case in a study's ranges of parameters, and make it simple (extra 'tune').
 
     The study says which parameters vary, how near a run is to failing, and perhaps whose smallest
-    value that fails is searched. A search that was stopped goes on where it was. Exits with 1 when a run fails.
+    value that fails is searched. A search that was stopped continues where it ended. Exits with 1 when a run fails.
     """
     from ....studies.journal import Journal
     from ....studies.reading import read_study

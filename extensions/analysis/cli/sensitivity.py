@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ....cli.shared.options import Cluster, JsonBesideTables, Workers
+from ....cli.shared.options import Cluster, JsonBesideTables, RunsFolder, StudySeeds, Workers
 from ....cli.shared.output import console, errors_reported, number, print_json, say, table
 from ....cli.shared.studies import check_cells, report_stop, run_maker
 from ....runtime.language.errors import AloftError, ExitCode
@@ -43,16 +43,12 @@ def sensitivity(
     samples: Annotated[
         int, typer.Option(min=8, help="With --sobol: samples, a power of two; N + 2 runs each.")
     ] = 64,
-    seeds: Annotated[
-        str, typer.Option(help="Seeds in place of the study's: 0:4 for a quick look.")
-    ] = "",
+    seeds: StudySeeds = "",
     where: Annotated[
         list[str] | None,
         typer.Option(help="The cell of the grid: axis=value, task=..., arm=... Repeatable."),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for the runs; by default results/NAME.")
-    ] = None,
+    out: RunsFolder = None,
     workers: Workers = 0,
     cluster: Cluster = "",
     as_json: JsonBesideTables = False,

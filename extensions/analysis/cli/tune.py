@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ....cli.shared.options import Cluster, JsonBesideTables, Workers
+from ....cli.shared.options import Cluster, JsonBesideTables, RunsFolder, Workers
 from ....cli.shared.output import console, errors_reported, print_json, say
 from ....cli.shared.studies import (
     check_cells,
@@ -21,9 +21,7 @@ from ....runtime.language.errors import AloftError, ExitCode
 
 def tune(
     file: Annotated[Path, typer.Argument(help="The study file, which has a section 'tune'.")],
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for the runs; by default results/NAME.")
-    ] = None,
+    out: RunsFolder = None,
     workers: Workers = 0,
     cluster: Cluster = "",
     as_json: JsonBesideTables = False,
@@ -31,7 +29,7 @@ def tune(
     """Search the best parameters of every arm of a study with Optuna (extra 'tune').
 
     The study says what is searched: ranges, graphs, seeds and the number of draws. A search that
-    was stopped goes on where it was. What is found goes into a file beside the study, from which 'aloft study FILE' takes it.
+    was stopped continues where it ended. What is found goes into a file beside the study, from which 'aloft study FILE' takes it.
     """
     from ....studies import tuning
     from ....studies.journal import Journal

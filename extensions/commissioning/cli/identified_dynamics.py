@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 KINDS = (
     ("rotor inertia", "kg m^2"), ("coulomb", "N m"), ("viscous", "N m s/rad"), ("load", "of the torque"),
     ("torque constant", "of the log's"), ("offset", "N m"), ("age of torques", "s"),
+    ("accelerometer offset", "m/s^2"),
 )  # fmt: skip
 
 
@@ -117,9 +118,7 @@ def description_text(found: IdentifiedDynamics, files: list[Path]) -> str:
     values = {key: found.values(kind) for key, kind in keys.items()}
     lines = [
         f"# {model.robot.name} as {', '.join(file.name for file in files)} show it, found by `aloft robot identify`.",
-        "profiles:",
-        "  identified:",
-        "    motors:",
+        *(("profiles:", "  identified:", "    motors:") if model.joints else ()),
     ]
     for joint in model.joints:
         lines.append(f"      {joint}:")

@@ -33,13 +33,15 @@ MOTION_BAND = 8.0
 
 
 def band_of(logs: list[MotionLog]) -> float:
-    """Return the band [Hz] in which these logs are fitted, by the spectra of their torques."""
+    """Return the band [Hz] in which these logs are fitted, by the spectra of their torques, or of a floating base's specific
+    force where these were not measured."""
     rate = min(1.0 / log.period for log in logs)
     grid = np.arange(0.1, 0.45 * rate, 0.1)
     power = np.zeros(len(grid))
     for log in logs:
-        assert log.torque is not None
-        torque = log.torque - log.torque.mean(axis=0)
+        driving = log.torque if log.base is None or log.torque is not None else log.base[:, 3:]
+        assert driving is not None
+        torque = driving - driving.mean(axis=0)
         spectrum = (np.abs(np.fft.rfft(torque, axis=0)) ** 2).sum(axis=1) * log.period
         found = np.fft.rfftfreq(len(torque), log.period)
         density = np.interp(grid, found, spectrum) * math.sqrt(len(torque))
@@ -85,6 +87,11 @@ class LowPass:
         return out.reshape(len(out), *values.shape[1:])
 
 
+def cutoff_of(log: MotionLog, band: float) -> float:
+    """Return the frequency [Hz] below which a log's motion is kept."""
+    return min(MOTION_BAND * band, 0.18 / log.period)
+
+
 def step_of(log: MotionLog, band: float) -> int:
     """Return the samples of a log between two at which equations are formed."""
     return max(1, int(1.0 / (log.period * 6.0 * MOTION_BAND * band)))
@@ -100,8 +107,7 @@ def _half(log: MotionLog, band: float, start: int) -> Motion:
 
     own = np.arange(start, len(log.position), 2)
     every = np.arange(len(log.position))
-    cutoff = min(MOTION_BAND * band, 0.18 / log.period)
-    step = step_of(log, band)
+    cutoff, step = cutoff_of(log, band), step_of(log, band)
 
     def whole(values: Array) -> Array:
         return smooth(CubicSpline(own, values[own])(every), log.period, cutoff)
@@ -111,11 +117,14 @@ def _half(log: MotionLog, band: float, start: int) -> Motion:
 
     position = whole(log.position)
     velocity = slope(position)
-    return Motion(position[::step], velocity[::step], slope(velocity)[::step])
+    joints = position[::step], velocity[::step], slope(velocity)[::step]
+    if log.base is None:
+        return Motion(*joints)
+    base = whole(log.base)
+    return Motion(*joints, base[::step, :3], slope(base[:, :3])[::step], base[::step, 3:])
 
 
 def torque_at(log: MotionLog, band: float) -> Array:
     """Return the torques where ``halves`` has the motion (n, n_joints) [N m], smoothed as the motion is."""
     assert log.torque is not None
-    cutoff = min(MOTION_BAND * band, 0.18 / log.period)
-    return smooth(log.torque, log.period, cutoff)[:: step_of(log, band)]
+    return smooth(log.torque, log.period, cutoff_of(log, band))[:: step_of(log, band)]

@@ -7,7 +7,8 @@ frame, and in the rotors' inertias:
 
 Many of them act only together, such as the inertia of a first link and the mass that the second hangs at its end. Links
 from the last to the first, and of each its moments and inertias before its mass, keep the columns of Y that do not depend on
-those before; what depends on them is added to them. So a base parameter is a link's own parameter and what further links add.
+those before; what depends on them is added to them. The masses of a floating base begin with its own. So a base parameter is
+a link's own parameter and what further links add.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from ....robots.robot_description import RobotDescription
 NAMES = ("mass", "m x", "m y", "m z", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 """The parameters of a link in Pinocchio's order; the inertia is about the joint's frame."""
 UNITS = ("kg", *("kg m",) * 3, *("kg m^2",) * 6)
+WHOLE_MASS = "whole mass"
+"""The one base parameter of a floating base that is a mass."""
 ORDER = (1, 2, 3, 4, 5, 6, 7, 8, 9, 0)
 SAMPLES = 60
 """Random states from which the dependent columns are found."""
@@ -62,6 +65,7 @@ class LinkRegressor:
         self.robot, self.model = robot, pin.Model(built.model)
         self.floating = robot.base_joint == "floating"
         self.first = 6 if self.floating else 0
+        self.soles = built.sole_frames
         if self.floating:
             self.model.gravity.linear = np.zeros(3)  # the specific force stands for it
         self.data = self.model.createData()
@@ -82,7 +86,9 @@ class LinkRegressor:
         whole = self._links_rows(motion)
         count = whole.shape[2] // 10
         order = [10 * k + p for k in range(count - 1, -1, -1) for p in ORDER if p]
-        order += [10 * k for k in range(count - 1, -1, -1)]
+        masses = [10 * k for k in range(count - 1, -1, -1)]
+        # a floating base's own mass first: that of every other link acts at its joint
+        order += masses[::-1] if self.floating else masses
         columns = whole.reshape(-1, whole.shape[2])[:, order]
         rotors = np.zeros((SAMPLES, whole.shape[1], n))
         for j in range(n):
@@ -107,6 +113,8 @@ class LinkRegressor:
 
     def _name(self, row: int) -> str:
         own = self._own[row]
+        if self.floating and own % 10 == 0:
+            return WHOLE_MASS  # that of every link, and the only mass that acts on its own
         further = [k for k in np.flatnonzero(self.lumped[row]).tolist() if k != own]
         text = f"{self.links[own // 10]} {NAMES[own % 10]}"
         for k in further[:3]:
@@ -116,6 +124,11 @@ class LinkRegressor:
         return text + (" + ..." if len(further) > 3 else "")
 
     @property
+    def whole_mass(self) -> int:
+        """The index of the base parameter of a floating base that is the whole mass."""
+        return self.names.index(WHOLE_MASS)
+
+    @property
     def described_base(self) -> Array:
         """The base parameters of the description (n_base)."""
         return np.asarray(self.lumped @ self.described)
@@ -123,6 +136,25 @@ class LinkRegressor:
     def rows(self, motion: Motion) -> Array:
         """Return Y in the base parameters, (n, n_velocities, n_base)."""
         return self._links_rows(motion, self._own)
+
+    def jacobians(self, position: Array) -> list[Array]:
+        """Return the Jacobian of each foot at its sole's centre, in its link's axes, (6, n_velocities), for joint angles."""
+        pin, model, data = self._pin, self.model, self.data
+        q = np.zeros(model.nq)
+        q[6], q[7:] = 1.0, position
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        return [pin.getFrameJacobian(model, data, f, pin.ReferenceFrame.LOCAL) for f in self.soles]
+
+    def lifting(self, position: Array) -> Array:
+        """Return what a unit of each axis of the base's specific force adds to the description's equations, (n, n_velocities, 3)."""
+        pin, model, data, found = self._pin, self.model, self.data, []
+        q = np.zeros(model.nq)
+        q[6] = 1.0
+        for angles in position:
+            q[7:] = angles
+            found.append(pin.crba(model, data, q)[:3].T.copy())
+        return np.array(found)
 
     def _states(self, motion: Motion, k: int) -> tuple[Array, Array, Array]:
         joints = motion.position.shape[1]

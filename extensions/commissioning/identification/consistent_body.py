@@ -22,6 +22,8 @@ from .identification import IdentificationError
 
 DESCRIBED = 1e-4
 """Weight of the distance to the description, beside that to the fit: it decides only what the fit leaves open."""
+OPEN = 1e-4
+"""The least information of a direction, in that of what was known beforehand."""
 LEAST = 1e-4
 """The smallest eigenvalue of a pseudo-inertia, in units of the link's described mass and size."""
 NEAR = 2.0
@@ -72,9 +74,12 @@ def consistent_dynamics(model: DynamicsModel, fit: FittedDynamics) -> Consistent
     to_value = np.zeros((count, width + len(others)))
     to_value[base, :width] = links.lumped * scales
     to_value[others, range(width, width + len(others))] = 1.0
-    deviation = np.sqrt(np.diag(fit.covariance))
-    correlation = fit.covariance / np.outer(deviation, deviation)
-    spread = deviation[:, None] * np.linalg.cholesky(correlation + 1e-9 * np.eye(count))
+    covariance = _by_the_logs(model, fit) if model.first else fit.covariance
+    deviation = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(deviation, deviation)
+    # where a log tells little of many links, rounding makes it indefinite
+    least = 1e-9 - 2.0 * min(0.0, float(np.linalg.eigvalsh(correlation)[0]))
+    spread = deviation[:, None] * np.linalg.cholesky(correlation + least * np.eye(count))
     # Steps from values with what was fitted, in its standard deviations and in what it leaves open: from zero, or in plain
     # numbers, the solver's tolerance is many deviations.
     home = np.concatenate([described / scales, fit.value[others]])
@@ -113,13 +118,29 @@ def consistent_dynamics(model: DynamicsModel, fit: FittedDynamics) -> Consistent
     found = start + steps @ np.array(solution.x)
     value = to_value @ found
     value[model.part("load").start + model.without_load] = 0.0
-    moved = np.abs(value - fit.value) / deviation
+    moved = np.abs(value - fit.value) / np.sqrt(np.diag(fit.covariance))
     return ConsistentDynamics(
         value,
         {name: _inertia(found[10 * k : 10 * k + 10] * scales[10 * k : 10 * k + 10])
          for k, name in enumerate(links.links)},
         {fit.unknowns.names[k]: float(moved[k]) for k in np.flatnonzero(moved > NEAR)},
     )  # fmt: skip
+
+
+def _by_the_logs(model: DynamicsModel, fit: FittedDynamics) -> Array:
+    """Return the covariance without what was known beforehand of the links: of a floating base's many links logs leave most open,
+    and within a prior so wide bodies would be any."""
+    prior = np.diag(fit.prior_std**2)
+    part = model.part("base")
+    prior[part, part] = model.base_prior
+    root = np.linalg.cholesky(prior + 1e-12 * np.diag(fit.prior_std**2))
+    half = np.linalg.solve(root, fit.covariance)
+    shares, axes = np.linalg.eigh(np.linalg.solve(root, half.T))
+    information = axes / np.maximum(shares, 1e-12) @ axes.T
+    information[range(part.start, part.stop), range(part.start, part.stop)] -= 1.0
+    told, axes = np.linalg.eigh(information)
+    spread = root @ axes / np.sqrt(np.maximum(told, OPEN))
+    return np.asarray(spread @ spread.T)
 
 
 def _scales(described: Array) -> Array:

@@ -10,8 +10,14 @@ from ....mathematics.arrays import Array
 from ....robots.robot_description import RobotDescription
 from .band import LowPass
 from .consistent_body import ConsistentDynamics, consistent_dynamics
-from .dynamics_fit import CONSTANT_STD, DynamicsModel, FittedDynamics, fit_dynamics
-from .identification import Estimate
+from .dynamics_fit import (
+    CONSTANT_STD,
+    DynamicsModel,
+    FittedDynamics,
+    fit_dynamics,
+    same_measurements,
+)
+from .identification import Estimate, IdentificationError
 from .motion_log import MotionLog, missing
 
 JUDGED = 10.0
@@ -31,8 +37,8 @@ LATEST = 0.1
 
 @dataclass(frozen=True)
 class LogResidual:
-    """Root mean squares on one log, by joint [N m or N]: of the torque, of what the fit does not explain, and of what the description
-    does not."""
+    """Root mean squares on one log, by joint or equation of the base [N m or N]: of the torque or the ground's measured force, of what the
+    fit does not explain, and of what the description does not."""
 
     log: str
     held_out: bool
@@ -97,15 +103,23 @@ def identify_dynamics(
     untold = [text for log in logs for text in missing(log, robot)]
     for log in judges:
         missing(log, robot)
+    same_measurements([*logs, *judges])
     model, fit = fit_dynamics(robot, logs, band, trusted)
     body = consistent_dynamics(model, fit)
     residuals = [residual_of(model, body.value, log, False) for log in logs]
     residuals += [residual_of(model, body.value, log, True) for log in judges]
+    part = model.part("base")
+    before = fit.prior_std[part]
+    if (np.sqrt(np.diag(fit.covariance))[part] > UNTOLD * before).all():
+        raise IdentificationError(
+            f"{logs[0].name} has too little motion: it tells no mass, moment or inertia better than the description"
+        )
     warnings = [
         *_of_position_alone(model, logs), *_disagreeing(model, fit), *_inconsistent(body),
         *_not_extrapolating(residuals, model.joints),
     ]  # fmt: skip
-    untold += _not_told(model, fit, bool(trusted))
+    forces = any(log.wrenches is not None for log in logs)
+    untold += _not_told(model, fit, bool(trusted) or forces)
     return IdentifiedDynamics(
         model, fit, body, tuple(residuals), _delay(logs), tuple(warnings),
         tuple(dict.fromkeys(untold)),
@@ -116,12 +130,12 @@ def residual_of(model: DynamicsModel, value: Array, log: MotionLog, held_out: bo
     """Return what unknowns leave of a log's torques below ``JUDGED`` Hz, beside what the description leaves."""
     formed = model.form(log, min(JUDGED, 0.1 / log.period))
     described = model.mean.copy()
-    described[model.part("coulomb")] = model.robot.motors.friction
-    described[model.part("viscous")] = model.robot.motors.damping
+    described[model.part("coulomb")] = model.robot.motors.friction[: model.n]
+    described[model.part("viscous")] = model.robot.motors.damping[: model.n]
 
     def rms(rows: Array) -> dict[str, float]:
-        sizes = np.sqrt((rows[:, model.first :] ** 2).mean(axis=0))
-        return dict(zip(model.joints, sizes.tolist(), strict=True))
+        sizes = np.sqrt((rows**2).mean(axis=0))
+        return dict(zip(model.equations, sizes.tolist(), strict=True))
 
     left = []
     for each in (value, described):
@@ -134,7 +148,8 @@ def _of_position_alone(model: DynamicsModel, logs: list[MotionLog]) -> list[str]
     """Warn of torques that follow from the positions alone: a controller is identified, not the robot."""
     found = []
     for log in logs:
-        assert log.torque is not None
+        if log.torque is None:
+            continue
         q = log.position[:: max(1, len(log.position) // 4000)]
         torque = log.torque[:: max(1, len(log.position) // 4000)]
         columns = [np.ones(len(q))]
@@ -206,13 +221,18 @@ def _not_told(model: DynamicsModel, fit: FittedDynamics, scaled: bool) -> list[s
     untold = [
         f"{name}: near the description's, for the logs do not tell it"
         for name, found, before in zip(fit.unknowns.names, std, fit.prior_std, strict=True)
-        if found > UNTOLD * before and not name.startswith(("load", "log constant", "offset"))
+        if found > UNTOLD * before
+        and not name.startswith(("load", "log constant", "offset", "accelerometer"))
     ]
     untold += [
         f"friction with load of {model.joints[j]}: left out, for the logs do not tell it from none"
         for j in model.without_load.tolist()
     ]
-    if not scaled:
+    if not model.weighed:
+        untold.append(
+            "the whole mass: in flight nothing weighs the robot, so it is the description's, and all else is relative to it"
+        )
+    elif not scaled:
         untold.append(
             "a common factor on torque constants, inertias and friction: torque and motion scale together, so it is as "
             "known as the torque constants beforehand, to "

@@ -320,7 +320,7 @@ def contact_jacobians(robot: RobotDescription, position: Array) -> tuple[Array, 
         centres = places[:, at] + (turned[:, at] @ to_centre[..., None])[..., 0]
         lowest = centres - radius[:, None] * _up(centres)[:, None]
         lever = lowest - places[:, at]
-        moving[:, at] -= _cross(lever) @ jacobians[:, at, 3:]
+        moving[:, at] -= cross_matrices(lever) @ jacobians[:, at, 3:]
         places[:, at] = lowest
     return moving.reshape(len(position), 3 * count, -1), places
 
@@ -347,7 +347,7 @@ def _gyroscope(
         moved = shifted(base - compliance * yields, -late / period)
         turned = moved + np.cross(moved, angle)
         rows = np.zeros((len(base), 3, 11))
-        rows[:, :, :3] = -_cross(moved).transpose(0, 2, 1)
+        rows[:, :, :3] = -cross_matrices(moved).transpose(0, 2, 1)
         rows[:, :, 3] = -slope(moved, period)
         rows[:, :, 4:7] = np.eye(3)
         for axis in range(3):
@@ -380,7 +380,9 @@ def _accelerometer(
     inner = _inner(len(base), period)
     late, left, covariance, place = 0.0, 0.0, np.eye(15), np.zeros(3)
     for _ in range(ROUNDS):
-        lever = _cross(bend) + np.einsum("kij,kjl->kil", _cross(turning), _cross(turning))
+        lever = cross_matrices(bend) + np.einsum(
+            "kij,kjl->kil", cross_matrices(turning), cross_matrices(turning)
+        )
         here = at_origin + lever @ place
         felt = shifted(here + np.cross(here, angle), -late / period)
         rows = np.zeros((len(base), 3, 15))
@@ -410,7 +412,7 @@ def vertical(turning: Array, period: float) -> tuple[Array, Array, Array]:
     for k in range(1, n):
         np.matmul(turned[k - 1], steps[k - 1], out=turned[k])
     drift = np.concatenate([np.zeros((1, 3, 3)), np.cumsum(turned[:-1] * period, axis=0)])
-    leaning = turned.transpose(0, 2, 1) @ _cross(np.array([0.0, 0.0, 1.0]))
+    leaning = turned.transpose(0, 2, 1) @ cross_matrices(np.array([0.0, 0.0, 1.0]))
     return turned[:, 2], leaning[..., :2], leaning @ drift
 
 
@@ -418,7 +420,7 @@ def _rotation_beyond(vectors: Array) -> Array:
     """Return the matrices of rotation vectors (n, 3), less the identity, (n, 3, 3)."""
     angle = np.linalg.norm(vectors, axis=1)[:, None, None]
     safe = np.maximum(angle, 1e-9)
-    across = _cross(vectors)
+    across = cross_matrices(vectors)
     return np.asarray(
         np.sin(safe) / safe * across + 2.0 * (np.sin(0.5 * safe) / safe) ** 2 * (across @ across)
     )
@@ -460,7 +462,7 @@ def _three(values: Array, std: Array) -> tuple[Estimate, ...]:
     return tuple(Estimate(float(a), float(b)) for a, b in zip(values, std, strict=True))
 
 
-def _cross(vectors: Array) -> Array:
+def cross_matrices(vectors: Array) -> Array:
     """Return the matrices of cross products with vectors (..., 3)."""
     out = np.zeros((*vectors.shape, 3))
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]

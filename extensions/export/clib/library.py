@@ -74,13 +74,6 @@ class SharedLibrary:
         """Make one tick: from ``inputs`` to ``outputs``. Returns the status."""
         return int(self._step(self._self, *self._arguments))
 
-    @property
-    def step_call(self) -> tuple[int, int, int, int]:
-        """The address of the function ``step``, and its arguments."""
-        address = ctypes.cast(self._step, ctypes.c_void_p).value or 0
-        memory, given, found = (int(a.ctypes.data) for a in (self.memory, self._in, self._out))
-        return address, memory, given, found
-
     def last_block(self) -> str:
         """Return the path of the block that the last status is about; empty where it is about none."""
         number = self._function("last_block")(self._self)

@@ -9,6 +9,7 @@ from math import degrees, radians, sqrt
 from ....blocks.scoring.footing import BallFeet, Footing, any_loaded
 from ....blocks.scoring.standing import (
     NEVER,
+    SETTLING,
     StandConstants,
     StandCriteria,
     StandRecord,
@@ -33,9 +34,6 @@ from ....runtime.language.context import Clock
 from ....runtime.language.parameters import parameter
 from ....runtime.language.signals import Field, Signal
 from ..signals import CourseGoal
-
-SETTLING = 0.15
-"""A foot that has taken a step may settle for so long [s]."""
 
 
 class CourseRecord(StandRecord):

@@ -298,19 +298,17 @@ def _legend(drawing: Drawing, style: Style) -> Iterator[tuple[str, float]]:
         x = end
 
 
-_POINTS = 72.0
+_POINTS, _SCALE = 72.0, 2.0
 
 
-def save_png(
-    drawing: Drawing, path: Path | IO[bytes], *, dark: bool = False, scale: float = 2.0
-) -> None:
-    """Write the picture, with ``scale`` dots for every pixel of the SVG file."""
+def save_png(drawing: Drawing, path: Path | IO[bytes], *, dark: bool = False) -> None:
+    """Write the picture, with ``_SCALE`` dots for every pixel of the SVG file."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     style = style_of(drawing.diagram)
     width, height = drawing.width + 4, drawing.height + LEGEND
-    figure = Figure(figsize=(width / _POINTS, height / _POINTS), dpi=_POINTS * scale)
+    figure = Figure(figsize=(width / _POINTS, height / _POINTS), dpi=_POINTS * _SCALE)
     FigureCanvasAgg(figure)
     colours = DARK if dark else LIGHT
     figure.patch.set_facecolor(colours["page"])
@@ -324,7 +322,7 @@ def save_png(
     figure.savefig(
         path,
         format="png",
-        dpi=_POINTS * scale,
+        dpi=_POINTS * _SCALE,
         facecolor=colours["page"],
         metadata={"Software": ""},
     )

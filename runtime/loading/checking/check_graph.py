@@ -340,7 +340,7 @@ def _assemble(
             if flat_wire is None:
                 continue
             at = f"{flat.path}.{name}"
-            wire = Wire(flat_wire.source, at, 0, {}, flat_wire.truth, flat_wire.where)
+            wire = Wire(flat_wire.source, at, where=flat_wire.where)
             given = values.get(at, {})
             if flat_wire.constant is not None:
                 specs.append(insert_constant(draft, name, flat_wire, given))

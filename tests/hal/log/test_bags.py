@@ -18,7 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 JOINTS = [joint.name for joint in find_robot("bruce").joints]
 COUNT, PERIOD, LATE = 200, 0.005, 0.02
-"""Messages arrive so late that their arrival is another clock than their headers'."""
+"""Messages arrive so late at most that their arrival is another clock than their headers'."""
 
 
 def write_bag(folder, plugin, *, swap=False):
@@ -36,7 +36,7 @@ def write_bag(folder, plugin, *, swap=False):
             time = PERIOD * k
             stamp = time_type(sec=10 + int(time), nanosec=round(1e9 * (time % 1.0)))
             header = header_type(stamp=stamp, frame_id="base")
-            arrival = round(1e9 * (10.0 + time + LATE))
+            arrival = round(1e9 * (10.0 + time + LATE / 8 * (k % 2)))
             message = types["sensor_msgs/msg/Imu"](
                 header, four(0.0, 0.0, 0.0, 1.0), nothing, vector(0.01 * k, 0.0, 0.0), nothing,
                 vector(0.0, 0.0, 9.81), nothing,
@@ -64,7 +64,7 @@ def test_a_bag_has_a_column_for_each_field_and_the_clock_of_its_headers(bag):
     log = read_log(bag)
     rates = log.array("imu_data.angular_velocity")
     assert rates.values[:, 0] == pytest.approx(0.01 * np.arange(COUNT))
-    assert rates.stamps == pytest.approx(10.0 + PERIOD * np.arange(COUNT), abs=1e-6)
+    assert rates.stamps == pytest.approx(PERIOD * np.arange(COUNT), abs=1e-9)
     assert log.array("imu_data.linear_acceleration[2]").values[:, 0] == pytest.approx(9.81)
     assert log.texts["joint_states.name"] == JOINTS
     assert log.array("joint_states.position").values.shape == (COUNT, len(JOINTS))
@@ -90,8 +90,11 @@ def test_a_bag_plays_the_robot(bag):
 
 def test_joints_that_change_their_order_are_refused(tmp_path):
     folder = write_bag(tmp_path / "bag", StoragePlugin.MCAP, swap=True)
-    with pytest.raises(LogError, match=r"joint_states\.name changes from message to message"):
-        read_log(folder)
+    log = read_log(folder)
+    assert log.array("imu_data.angular_velocity").values.shape == (COUNT, 3)
+    text = r"joint_states\.name changes from message to message, in row 101 first"
+    with pytest.raises(LogError, match=text):
+        log.array("joint_states.position")
 
 
 @pytest.mark.long

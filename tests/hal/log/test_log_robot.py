@@ -216,6 +216,29 @@ def test_a_force_closes_and_opens_at_two_thresholds():
     assert with_hysteresis(force, 20.0, 10.0).tolist() == [0, 0, 1, 1, 0, 0, 1]
 
 
+def test_a_wrench_is_kept_for_identification_and_its_normal_force_closes(tmp_path):
+    wrench = np.zeros((6, COUNT))
+    wrench[2], wrench[4] = arrays()["load"], 1.5
+    np.savez(tmp_path / "log.npz", **arrays(), wrench=wrench)
+    contacts = {
+        "left_foot": {"force": {"columns": "wrench"}},
+        "right_foot": {"force": "load"},
+    }
+    params = LogRobot.Params.model_validate(
+        {**graph(tmp_path, "log.npz")["blocks"]["robot"]["with"], "contacts": contacts}
+    )
+    robot = find_robot("bruce")
+    played = play(read_log(tmp_path / "log.npz"), params, robot, 0.01)
+    left, right = ([f.name for f in robot.feet].index(name) for name in ("left_foot", "right_foot"))
+    assert played.wrenches[:, left] == pytest.approx(wrench.T)
+    assert played.wrenches[:, right, 2] == pytest.approx(wrench[2])
+    assert np.isnan(played.wrenches[:, right][:, [0, 1, 3, 4, 5]]).all()
+    assert played.rows.closed[0].all() and not played.rows.closed[-1].any()
+    contacts["left_foot"] = {"force": "gyro"}
+    text = problems(graph(tmp_path, "log.npz", contacts=contacts))
+    assert "gyro has 3 columns, expected 1 or 6" in text
+
+
 def test_a_mean_over_the_tick_is_exact_for_lines():
     stamps = np.linspace(0.0, 1.0, 101)
     means = mean_over(stamps, stamps[:, None], np.array([0.5, 1.0]), 0.1)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from aloft.mathematics.compiling.kernel_call import CACHE_LINE, aligned_zeros
 from aloft.mathematics.compiling.lanes import OPERATIONS, WIDTH, Lanes, Program
 
 
@@ -59,3 +60,10 @@ def test_a_program_without_constants_or_inputs() -> None:
     made = Lanes(program(("output", 0, 1, 0)), 3, (), (1,))
     made.run()
     assert not made.outputs[0].any()
+
+
+@pytest.mark.parametrize("shape", [(1, 8), (3, 5), (700, 264)])
+def test_aligned_zeros_begin_with_a_line_of_the_cache(shape: tuple[int, int]) -> None:
+    found = [aligned_zeros(shape) for _ in range(3)]
+    assert all(each.ctypes.data % CACHE_LINE == 0 for each in found)
+    assert all(each.shape == shape and not each.any() for each in found)

@@ -2,11 +2,14 @@
 
 import numpy as np
 
+from aloft.mathematics.linear_algebra import product
 from aloft.planner.models.euler_angles import (
     angular_motion,
     euler_angles,
     euler_rates,
     rotation,
+    times,
+    times_transposed,
     unwrapped,
 )
 
@@ -46,3 +49,21 @@ def test_unwrapped_angles_have_the_bits_of_numpys() -> None:
         found = unwrapped(angles)
         assert found.tobytes() == np.unwrap(angles, axis=0).tobytes()
         assert not np.shares_memory(found, angles)
+
+
+def test_rotations_have_the_bits_of_products_of_matrices() -> None:
+    rng = np.random.default_rng(6)
+    angles = rng.uniform(-4.0, 4.0, (500, 3))
+    angles[rng.random(angles.shape) < 0.2], angles[rng.random(angles.shape) < 0.2] = 0.0, -0.0
+    about = np.zeros((3, 500, 3, 3))
+    for axis, turn in enumerate(about):
+        one, other = (axis + 1) % 3, (axis + 2) % 3
+        cosine, sine = np.cos(angles).T[axis], np.sin(angles).T[axis]
+        turn[:, axis, axis] = 1.0
+        turn[:, one, one], turn[:, other, other] = cosine, cosine
+        turn[:, one, other], turn[:, other, one] = -sine, sine
+    found = rotation(angles)
+    assert found.tobytes() == product(product(about[1], about[0]), about[2]).tobytes()
+    for turned, matrices in ((times, found), (times_transposed, found.swapaxes(1, 2))):
+        expected = product(matrices, angles[:, :, None])[:, :, 0]
+        assert turned(found, angles).tobytes() == expected.tobytes()

@@ -111,9 +111,11 @@ def test_a_fault_ends_all_parts() -> None:
     assert run.results["far"].reason.startswith("machine 'near' failed: ")
 
 
-def in_a_thread(part: BoundPart, results: dict[str, RunResult], name: str) -> threading.Thread:
+def in_a_thread(
+    part: BoundPart, results: dict[str, RunResult], name: str, ticks: int | None = None
+) -> threading.Thread:
     def run() -> None:
-        results[name] = run_part(part)
+        results[name] = run_part(part, ticks)
 
     thread = threading.Thread(target=run, daemon=True)
     thread.start()
@@ -146,6 +148,48 @@ def test_a_part_that_is_started_again_joins_without_the_others_starting_again() 
         assert not thread.is_alive()
     assert results["onboard"].reason == "machine 'near' has ended its run"
     assert far.lost == 0
+
+
+def results_of(ticks: Mapping[str, int], *, stop: str = "") -> dict[str, RunResult]:
+    """Results of a chain in which the robot goes to ``near`` and that to ``far``, from which nobody
+    reads, with so many ticks for each part; ``stop`` is a part that is asked to end at once."""
+    graph = free()
+    blocks = [replace(s, wires={}) if s.path == "robot" else s for s in graph.blocks]
+    placed = split_over_machines(replace(graph, blocks=tuple(blocks)))
+    hub = Hub()
+    parts = {m.name: BoundPart(placed, m.name, hub.transport()) for m in placed.machines}
+    results: dict[str, RunResult] = {}
+    threads = [in_a_thread(part, results, name, ticks[name]) for name, part in parts.items()]
+    if stop:
+        assert wait_for(lambda: parts[stop].clock.tick > 5)
+        parts[stop].clock.stop_reason = "enough"
+    for thread in threads:
+        thread.join(60.0)
+        assert not thread.is_alive()
+    return results
+
+
+def test_a_part_from_which_nobody_reads_ends_alone() -> None:
+    results = results_of({"onboard": 80, "near": 20_000, "far": 20})
+    assert (results["far"].ticks, results["onboard"].ticks) == (20, 80)
+    assert all(result.success for result in results.values())
+    assert results["near"].reason == "machine 'onboard' has ended its run"
+
+
+def test_a_part_from_which_another_reads_ends_all() -> None:
+    results = results_of({"onboard": 20_000, "near": 20, "far": 20_000})
+    assert results["near"].ticks == 20
+    for name in ("onboard", "far"):
+        assert results[name].success and results[name].ticks < 20_000
+        assert results[name].reason.endswith("has ended its run")
+
+
+def test_a_part_from_which_nobody_reads_ends_all_where_it_is_asked_to_end() -> None:
+    results = results_of({"onboard": 20_000, "near": 20_000, "far": 20_000}, stop="far")
+    assert results["far"].reason == "enough"
+    for name in ("onboard", "near"):
+        assert results[name].success and results[name].ticks < 20_000
+        assert results[name].reason.endswith("has ended its run")
 
 
 @pytest.mark.long

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from aloft.blocks.general.vectors import Vector
-from aloft.runtime.language.block import Block, Input, Output
+from aloft.runtime.language.block import STOP_CYCLES, Block, Input, Output
 from aloft.runtime.language.errors import AloftError, BlockError, ExitCode, RunError
 from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.running.executor import Executor, run
-from aloft.runtime.running.life_cycle import STOP_CYCLES, LifeCycle, LifeState
+from aloft.runtime.running.life_cycle import LifeCycle, LifeState
 from aloft.runtime.running.sink import Sink
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 

@@ -114,5 +114,5 @@ def test_parts_whose_clocks_are_set_stay_together(
     parts = PARTS.replace("PORT_A", str(free_port())).replace("PORT_B", str(free_port()))
     found = run(tmp_path, GRAPH + parts + links, jumping, "--local", "--no-record")
     ticks = [part["ticks"] for part in found["machines"].values()]
-    # whichever part runs free and is first at its end ends the other
+    # free parts: if the one that is read from is first at its end, it ends the other
     assert ticks == [100, 100] if not links else max(ticks) == 100

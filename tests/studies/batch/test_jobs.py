@@ -14,9 +14,10 @@ from typing import Any
 
 import pytest
 
+from aloft.processes.child_process import processors
 from aloft.runtime.language.errors import AloftError
 from aloft.runtime.language.units import parse_unit
-from aloft.studies.batch.jobs import JobPool, JobResult, attempt, job_results, processors
+from aloft.studies.batch.jobs import JobPool, JobResult, attempt, job_results
 
 
 def results(function: Any, jobs: Any, workers: int = 2) -> dict[int, JobResult]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import pytest
+import yaml
 from tests.cli.conftest import run_for_json, run_here
-from tests.shared_data import needs_pendulum
+from tests.shared_data import needs_icub, needs_pendulum
 
+from aloft.lab.studies import icub_estimators
 from aloft.lab.studies.pendulum_dynamics import HELD_OUT, SLOW, write_graphs
 from aloft.robots.description import find_robot
 
@@ -54,3 +56,27 @@ def test_logs_without_torques_say_what_cannot_be_told(graphs):
     file.write_text(text)
     done = run_here("robot", "identify", str(file), code=2)
     assert "has no torques, so masses" in " ".join(done.stderr.split())
+
+
+@needs_icub
+@pytest.mark.long
+def test_normal_forces_of_a_walk_weigh_an_icub(tmp_path):
+    """Standing, its soles show 34.0 kg, on one foot 31 to 32, for a lifted one shows 7 to 15 N; the description has 33.1."""
+    robot = icub_estimators.write_robot(tmp_path)
+    file, out = tmp_path / "walk.yaml", tmp_path / "found.yaml"
+    walk = icub_estimators.graph_of(robot, "walking.mat", 100, "StateEstimator", 0.0)
+    file.write_text(yaml.safe_dump(walk))
+    found = run_for_json("robot", "identify", str(file), "--out", str(out))
+    mass = found["values"]["base"]["whole mass"]
+    assert mass["value"] == pytest.approx(31.6, abs=0.5) and mass["std"] < 0.5
+    assert found["values"]["coulomb"] == {}
+    assert sum("near the description's" in text for text in found["untold"]) > 200
+    assert "profiles" not in out.read_text() and "# l_sole" not in out.read_text()
+    shown = run_here("robot", "identify", str(file))
+    assert "whole mass" in shown.stdout and "force z of the base" in shown.stdout
+    sway = tmp_path / "sway.yaml"
+    sway.write_text(file.read_text().replace("walking.mat", "com-sinusoid.mat"))
+    done = run_here("robot", "identify", str(sway), code=2)
+    assert "leave 0.0% of the equations of com-sinusoid.mat: its feet stand" in " ".join(
+        done.stderr.split()
+    )

@@ -159,15 +159,6 @@ def test_a_log_without_torques_says_what_cannot_be_told(robot):
         missing(log, robot)
 
 
-def test_a_floating_base_is_refused_with_what_tells_it():
-    log = MotionLog("walk", 0.002, np.zeros((50, 10)), np.ones((50, 10)))
-    with pytest.raises(
-        IdentificationError,
-        match="bruce has a floating base, and inertias are told from logs of fixed",
-    ):
-        missing(log, find_robot("bruce"))
-
-
 def test_a_short_log_and_an_unknown_joint_are_refused(robot):
     time = 0.002 * np.arange(500)[:, None]
     log = MotionLog("short", 0.002, np.sin(9 * time) * [1, 1], np.sin(9 * time) * [1, 1])
