@@ -8,6 +8,7 @@ from __future__ import annotations
 from array import array
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -128,16 +129,18 @@ class _Topic:
                 why = log.refused[parents[0]] if parents else "is not in every message"
                 log.refused[path] = "has one row" if rows < 2 else why
             else:
-                log.arrays[path] = LogArray(np.array(numbers, np.float64).reshape(rows, -1))
+                values = np.array(numbers, np.float64).reshape(rows, -1)
+                log.arrays[path] = LogArray(values, frame=next(iter(self.frames)))
         return stamps
 
 
 def _fields(message: Any) -> tuple[str, ...]:
-    return _fields_of(type(message))
+    kind: Any = type(message)
+    return _fields_of(kind)
 
 
 @cache
-def _fields_of(kind: type) -> tuple[str, ...]:
+def _fields_of(kind: Any) -> tuple[str, ...]:
     return tuple(
         each for each in getattr(kind, "__dataclass_fields__", ()) if each != "__msgtype__"
     )
@@ -167,7 +170,7 @@ def read_bag(path: Path) -> LogFile:
     first = min((int(own.min()) for own in stamps.values()), default=0)
     since = {id(own): 1e-9 * (own - first).astype(np.float64) for own in stamps.values()}
     for name, own in stamps.items():
-        log.arrays[name] = LogArray(log.arrays[name].values, since[id(own)])
+        log.arrays[name] = replace(log.arrays[name], stamps=since[id(own)])
     if not log.arrays and not log.refused:
         raise LogError(f"{path.name} has no messages")
     return log

@@ -185,7 +185,7 @@ def play(log: LogFile, params: LogParameters, robot: RobotDescription, period: f
         played.commanded = rows._replace(
             last=last_rows(commanded.stamps, player.times, hold=True), linear=np.array([False])
         ).at_ticks()
-    played.warnings = warnings_of(played, params, robot, player.taken)
+    played.warnings = warnings_of(log, played, params, robot, player.taken)
     return played
 
 

@@ -120,6 +120,11 @@ def test_what_the_log_does_not_have_is_not_valid():
     assert not played(log_of()).rows.contacts_valid.any()
 
 
+def test_a_walk_without_contacts_is_warned_of():
+    q = {"joints": {"names": ["left_knee"], "position": "q"}}
+    assert "contacts are not given: the feet never touch" in played(log_of(q=TIMES), **q).warnings
+
+
 def test_quaternions_in_either_order_and_those_that_are_none():
     truth = {"position": "force", "quaternion": "four"}
     lost = FOUR.copy()
