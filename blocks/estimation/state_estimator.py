@@ -171,7 +171,7 @@ class StateEstimator(InertialEstimator):
 
     It starts at the first sample, or in a gantry when the first point touches the ground, with the robot standing on level ground, or ground of that ``slope``; or in a step,
     if a rate is above 0.5 rad/s, also with all points in contact: then only the points in contact are on the ground, they give the first velocity, the tilt is
-    theirs, or the accelerometer's where they lie in one line, and the result has a warning. From then on each sole that stands keeps its tilt: what
+    theirs, beside their line the accelerometer's where they lie in one, and the result has a warning. From then on each sole that stands keeps its tilt: what
     seems to change in it corrects the tilt within 1 s, and moves the leg's points by the share ``flexion``, for a leg yields
     under its load and encoders do not see it. The world's
     origin is midway between the soles, and x is the heading of the feet; for feet of one contact point it is
@@ -370,11 +370,11 @@ def use_soles(
     for foot in range(trust.lean.shape[0]):
         for point in range(standing.shape[0]):
             standing[point] = points.active[point] and owners[point] == foot
-        flat = misalignment(
+        if count_standing(standing) == 0:
+            continue
+        misalignment(
             estimate.orientation, motion.points, standing, motion.forward, constants.gradient, error, place
         )  # fmt: skip
-        if not flat:
-            continue
         lean = trust.lean[foot]
         lean[0] += passing * (error[0] - lean[0])
         lean[1] += passing * (error[1] - lean[1])
