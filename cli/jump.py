@@ -137,7 +137,7 @@ def jump(
         if many:
             code = run_many(path, settings, many, out, as_json)
         else:
-            options = OneRunOptions(record=recording.path_for("jump"), as_json=as_json, times=False)
+            options = OneRunOptions(record=recording.path_for("jump"), as_json=as_json)
             code = run_once(loaded, options, out, also={"asked": changes, "plan": planned, **about})
     raise typer.Exit(code)
 

@@ -73,11 +73,12 @@ class Table(NamedTuple):
 
 
 class Expected:
-    """What a log must play, worked out from what was written."""
+    """All that a log must play, worked out from what was written."""
 
     def __init__(self, drawn: DrawnLog, robot: Any) -> None:
         self.drawn, self.robot = drawn, robot
         self.tables: dict[str, Table] = {}
+        self.jitter = 0.0
         self.first_instant = min(int(drawn.stamps[key.split(".")[0]].min()) for key in drawn.quantities) if drawn.kind in ("mcap", "bag") else None  # fmt: skip
         for key, quantity in drawn.quantities.items():
             values = quantity.meant.astype(float)
@@ -119,6 +120,8 @@ class Expected:
         times = (counts - start).astype(float) * STAMPS[drawn.unit]
         order = np.argsort(times, kind="stable") if clock.get("sort") else rows
         times = times[order]
+        steps = import_module("pandas").Series(times).diff()
+        self.jitter = max(self.jitter, steps.std(ddof=0) / steps.mean())
         if clock.get("even"):
             times = times[0] + (times[-1] - times[0]) * rows / (len(rows) - 1)
         return times, order
@@ -290,7 +293,7 @@ def compare(expected: Expected, played: Any) -> list[str]:
     used = [table.times for key, table in expected.tables.items() if key in drawn.quantities]
     gaps = max(int((np.diff(times) > 5.0 * np.median(np.diff(times))).sum()) for times in used)
     longest = max(used, key=len)
-    shares += [("log_gaps", played.gaps, gaps), ("log_rows", played.count, len(longest)),
+    shares += [("log_jitter", played.jitter, expected.jitter), ("log_gaps", played.gaps, gaps), ("log_rows", played.count, len(longest)),
                ("log_rate_hz", played.rate, 1.0 / np.diff(longest).mean())]  # fmt: skip
     wrong += [
         f"{what} is {found}, expected {right}"

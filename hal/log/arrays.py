@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .log_file import LogError, LogFile, bounded, usual_rows
+from .matlab_texts import matlab_texts
 
 
 def read_npz(path: Path) -> LogFile:
@@ -70,17 +71,16 @@ def _value_of(h5py: Any, file: Any, item: Any) -> Any:
     kind = item.attrs.get("MATLAB_class", b"")
     if "MATLAB_empty" in item.attrs or item.shape is None:
         raise _NoColumnError("is empty")
-    if kind == b"char":
+    if (texts := matlab_texts(file, item)) is not None:
+        return np.array(texts)
+    if kind in (b"char", b"string"):
         raise _NoColumnError("is text")
     if h5py.check_string_dtype(item.dtype) is not None:
         if item.ndim != 1:
             raise _NoColumnError("is text")
         return np.array([str(text) for text in item.asstr()[()]])
     if h5py.check_ref_dtype(item.dtype) is not None:
-        cells = [file[each] for each in item[()].ravel() if each]
-        if not all(each.attrs.get("MATLAB_class", b"") == b"char" for each in cells) or not cells:
-            raise _NoColumnError("is a cell array, of which only one of texts is read")
-        return np.array(["".join(map(chr, each[()].ravel(order="F"))) for each in cells])
+        raise _NoColumnError("is a cell array, of which only one of texts is read")
     if item.dtype.names == ("real", "imag"):
         raise _NoColumnError("has complex numbers")
     if item.dtype.kind not in "fiubcV":

@@ -8,6 +8,8 @@ from __future__ import annotations
 from array import array
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -22,7 +24,7 @@ MOST_WIDE = 4096
 
 
 class _Topic:
-    """What is gathered of one topic: its fields row by row, its stamps [ns], and what cannot be a column."""
+    """One topic: its fields row by row, its stamps [ns], and what cannot be a column."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -127,12 +129,21 @@ class _Topic:
                 why = log.refused[parents[0]] if parents else "is not in every message"
                 log.refused[path] = "has one row" if rows < 2 else why
             else:
-                log.arrays[path] = LogArray(np.array(numbers, np.float64).reshape(rows, -1))
+                values = np.array(numbers, np.float64).reshape(rows, -1)
+                log.arrays[path] = LogArray(values, frame=next(iter(self.frames)))
         return stamps
 
 
-def _fields(message: Any) -> list[str]:
-    return [each for each in getattr(message, "__dataclass_fields__", ()) if each != "__msgtype__"]
+def _fields(message: Any) -> tuple[str, ...]:
+    kind: Any = type(message)
+    return _fields_of(kind)
+
+
+@cache
+def _fields_of(kind: Any) -> tuple[str, ...]:
+    return tuple(
+        each for each in getattr(kind, "__dataclass_fields__", ()) if each != "__msgtype__"
+    )
 
 
 def read_bag(path: Path) -> LogFile:
@@ -159,7 +170,7 @@ def read_bag(path: Path) -> LogFile:
     first = min((int(own.min()) for own in stamps.values()), default=0)
     since = {id(own): 1e-9 * (own - first).astype(np.float64) for own in stamps.values()}
     for name, own in stamps.items():
-        log.arrays[name] = LogArray(log.arrays[name].values, since[id(own)])
+        log.arrays[name] = replace(log.arrays[name], stamps=since[id(own)])
     if not log.arrays and not log.refused:
         raise LogError(f"{path.name} has no messages")
     return log

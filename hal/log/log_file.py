@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
@@ -33,12 +33,14 @@ class LogError(ValueError):
 @dataclass(frozen=True)
 class LogArray:
     """One array of a log: ``values`` (n, k), and when its n rows were taken: ``stamps`` (n,) [s] since the file's first, none if the
-    file does not say. ``unit`` is what the file says, ``whole`` (n,) the same values where floats would round them."""
+    file does not say. ``unit`` and ``frame``, in which a sensor measures, are what the file says, ``whole`` (n,) the same values where
+    floats would round them."""
 
     values: Array
     stamps: Array1D | None = None
     unit: str | None = None
     whole: Indices1D | None = None
+    frame: str = ""
 
 
 @dataclass
@@ -72,7 +74,7 @@ class LogFile:
                 raise LogError(
                     f"{stem} has {whole.values.shape[1]} columns, so the last is {stem}[{whole.values.shape[1] - 1}]"
                 )
-            return LogArray(whole.values[:, k : k + 1], whole.stamps, whole.unit)
+            return replace(whole, values=whole.values[:, k : k + 1])
         known = [*self.arrays, *self.refused]
         near = get_close_matches(stem, known, 3, 0.5)
         raise LogError(

@@ -34,7 +34,7 @@ class LogJoints(Parameters):
 
     names: list[str] | str | None = parameter(
         None,
-        text="joints in the columns' order, or the file's list of them; none: the robot's joints",
+        text="joints in the columns' order, - for one that is none, or the file's list of them; none: the robot's joints",
     )
     position: Columns = parameter(text="a column for each joint [rad]")
     velocity: Columns | None = parameter(

@@ -34,6 +34,11 @@ from .series import Series
 from .turns import quaternion_of_rpy, rates_of, rotation_of, rotation_of_rpy, unit_quaternions
 from .warned_log import warnings_of
 
+UNNAMED = "?"
+"""In place of a column's name: its joint is not known yet, and the log is not played."""
+NO_JOINT = "-"
+"""In place of a column's name: it is no joint of the robot."""
+
 
 class _Player:
     """Takes the columns of a log; every mistake is noted, and none ends it."""
@@ -180,7 +185,7 @@ def play(log: LogFile, params: LogParameters, robot: RobotDescription, period: f
         played.commanded = rows._replace(
             last=last_rows(commanded.stamps, player.times, hold=True), linear=np.array([False])
         ).at_ticks()
-    played.warnings = warnings_of(played, params, robot, player.taken)
+    played.warnings = warnings_of(log, played, params, robot, player.taken)
     return played
 
 
@@ -197,8 +202,21 @@ def _joints(player: _Player, names: Sequence[str]) -> tuple[list[int], tuple[Ser
             player.played.problems.append(LogProblem(problem, "joints.names"))
     elif given.names is not None:
         listed = given.names
+    if UNNAMED in listed:
+        at = ", ".join(str(k) for k, name in enumerate(listed) if name == UNNAMED)
+        player.played.problems.append(
+            LogProblem(
+                f"columns {at} (the first is 0) have no joint's name yet",
+                "joints.names",
+                found=UNNAMED,
+                expected="the names of all columns in their order, as the driver's documentation has them",
+                fix=f"a joint of {player.robot.name}, or - for a column that is none",
+            )
+        )
     columns, unknown = match_joints(list(listed), list(names))
-    for name in dict.fromkeys(name for name in listed if listed.count(name) > 1):
+    for name in dict.fromkeys(
+        name for name in listed if listed.count(name) > 1 and name not in (UNNAMED, NO_JOINT)
+    ):
         player.played.problems.append(
             LogProblem(f"joint {name} has {listed.count(name)} columns", "joints.names", "one column",
                        f"{name}, {name}")

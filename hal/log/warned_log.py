@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...robots.description import RobotDescription
-from .columns import MOST_JITTER, usual_step
+from .columns import MOST_JITTER, names_of, usual_step
+from .log_file import LogFile
 from .parameters import LogParameters
 from .played_rows import PlayedLog, PlayedRows
 from .series import GAP, Series
@@ -21,7 +22,11 @@ BEYOND = 1.0
 
 
 def warnings_of(
-    played: PlayedLog, params: LogParameters, robot: RobotDescription, taken: Sequence[Series]
+    log: LogFile,
+    played: PlayedLog,
+    params: LogParameters,
+    robot: RobotDescription,
+    taken: Sequence[Series],
 ) -> list[str]:
     """Return what in a log may mislead who uses it."""
     assert played.rows is not None
@@ -31,6 +36,7 @@ def warnings_of(
         *_of_joints(params, robot, played.rows),
         *_of_contacts(params, robot, played.rows),
         *_of_imu(params, played.rows),
+        *_of_mounting(log, params, robot),
     ]
 
 
@@ -47,9 +53,10 @@ def _of_clock(played: PlayedLog, params: LogParameters, taken: Sequence[Series])
     for what, share in (("IMU", played.imu_repeats), ("joints", played.joint_repeats)):
         if share > MANY_REPEATS:
             yield f"{100.0 * share:.1f} % of the samples of the {what} repeat the one before exactly: they were not renewed"
-    if played.jitter > MOST_JITTER and not params.clock.even:
+    spread = max(_spread(series) for series in taken)
+    if spread > MOST_JITTER and not params.clock.even:
         yield (
-            f"the steps between stamps vary by {100.0 * played.jitter:.0f} % of their mean: if they are arrival times, "
+            f"the steps between stamps vary by {100.0 * spread:.0f} % of their mean: if they are arrival times, "
             "clock.even: true is right"
         )
     if played.gaps:
@@ -65,6 +72,12 @@ def _of_clock(played: PlayedLog, params: LogParameters, taken: Sequence[Series])
             f"clock.even: half of the rows are more than {shift.shift:.3g} s off their stamps, so rows are missing: an even "
             "grid is wrong there"
         )
+
+
+def _spread(series: Series) -> float:
+    """Return the standard deviation of the steps between rows, relative to their mean, without gaps."""
+    steps = np.diff(series.stamps)[~series.gaps()[:-1]]
+    return float(steps.std() / steps.mean()) if steps.size else 0.0
 
 
 def _of_joints(params: LogParameters, robot: RobotDescription, rows: PlayedRows) -> Iterator[str]:
@@ -89,6 +102,8 @@ def _of_joints(params: LogParameters, robot: RobotDescription, rows: PlayedRows)
 
 def _of_contacts(params: LogParameters, robot: RobotDescription, rows: PlayedRows) -> Iterator[str]:
     if not params.contacts:
+        if params.joints is not None and params.imu is not None and robot.feet:
+            yield "contacts are not given: the feet never touch"
         return
     untold = [foot.name for foot in robot.feet if foot.name not in params.contacts]
     if untold:
@@ -114,6 +129,17 @@ def _of_imu(params: LogParameters, rows: PlayedRows) -> Iterator[str]:
             "the specific force points down while the robot stands: scale: [-1.0] where the log has gravity in its place, or "
             "look at imu.rpy"
         )
+
+
+def _of_mounting(log: LogFile, params: LogParameters, robot: RobotDescription) -> Iterator[str]:
+    imu = params.imu
+    if imu is None or imu.sensor or imu.link or any(imu.position) or any(imu.rpy):
+        return
+    frame = log.array(names_of(imu.angular_velocity)[0]).frame
+    links = [link.name for link in robot.links if link.name != robot.base]
+    if frame in robot.sensors.mounted or frame in links:
+        part = "sensor" if frame in robot.sensors.mounted else "link"
+        yield f"the IMU's messages are in the frame {frame}, and it is played at {robot.base}: imu.{part}: {frame}"
 
 
 def _some(names: Sequence[str]) -> str:

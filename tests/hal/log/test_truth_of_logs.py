@@ -120,6 +120,11 @@ def test_what_the_log_does_not_have_is_not_valid():
     assert not played(log_of()).rows.contacts_valid.any()
 
 
+def test_a_walk_without_contacts_is_warned_of():
+    q = {"joints": {"names": ["left_knee"], "position": "q"}}
+    assert "contacts are not given: the feet never touch" in played(log_of(q=TIMES), **q).warnings
+
+
 def test_quaternions_in_either_order_and_those_that_are_none():
     truth = {"position": "force", "quaternion": "four"}
     lost = FOUR.copy()
@@ -163,6 +168,8 @@ def test_an_even_grid_where_rows_are_missing_is_warned_of():
     log = log_of(t=TIMES[keep], gyro=GYRO[keep], force=REST[keep])
     result = played(log, clock={"stamps": "t", "even": True})
     assert any("off their stamps, so rows are missing" in each for each in result.warnings)
+    stamped = played(log).warnings
+    assert "the log has 1 gaps" in stamped[0] and "arrival" not in " ".join(stamped)
     assert not played(log_of(), clock={"stamps": "t", "even": True}).warnings
 
 
