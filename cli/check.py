@@ -20,7 +20,7 @@ def check(
     overrides: CompletedOverrides = None,
     as_json: AsJson = False,
     cost: Annotated[
-        bool, typer.Option("--cost", help="Say what a minute of its recording takes.")
+        bool, typer.Option("--cost", help="Print how large a minute of its recording is.")
     ] = False,
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON Schema of graph files, for editors.")
@@ -89,8 +89,8 @@ def check_users_blocks(graph: CheckedGraph) -> list[str]:
 def doctor(
     as_json: AsJson = False,
 ) -> None:
-    """Say whether all libraries load, what this machine allows a control loop in real time, and what
-    to change; nothing is changed."""
+    """Check whether all libraries load and what this machine allows a control loop in real time; print
+    what to change, and change nothing."""
     from ..runtime.running.machine_check import examine_libraries, examine_machine
 
     findings = [examine_libraries(), *examine_machine()]

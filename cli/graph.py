@@ -80,8 +80,8 @@ def graph(
 
     With --svg, --png or --web, draw the blocks with their ports and wires. The page of a recording
     (RUN.rrd --web) has a slider for the time, and shows the values that a chosen block reads and writes
-    then. With --live the page shows a running graph: values, times of blocks and what is late, now; of a
-    graph on several machines all parts, with --keys, --as and --local as for `aloft top`.
+    then. With --live the page shows a running graph: its values, the times of its blocks, and what is late.
+    Of a graph on several machines it shows all parts; --keys, --as and --local are those of `aloft top`.
     """
     from ..runtime.language.extensions import provided
     from ..runtime.loading import checked_file, picture

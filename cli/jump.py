@@ -41,8 +41,8 @@ HELP = {
     "back": "How far behind.",
     "left": "How far to the left.",
     "right": "How far to the right.",
-    "up": "How much higher it lands; brings the step.",
-    "down": "How much lower; brings the platform it starts on.",
+    "up": "How much higher it lands; a step is put there.",
+    "down": "How much lower; a platform is put under its start.",
     "turn": "How far it turns, to the left: 30deg; to the right: -30deg.",
 }
 FIELDS = {
@@ -72,7 +72,9 @@ class PlanningOptions:
 
     nearest: Annotated[
         bool,
-        typer.Option(help="Where there is no plan, search the nearest jump that has; about 6 s."),
+        typer.Option(
+            help="Where a jump has no plan, search for the nearest one that has; about 6 s."
+        ),
     ] = True
     rehearse: Annotated[bool, typer.Option("--rehearse", help=REHEARSE_HELP)] = False
 
@@ -135,7 +137,7 @@ def jump(
         if many:
             code = run_many(path, settings, many, out, as_json)
         else:
-            options = OneRunOptions(record=recording.path_for("jump"), as_json=as_json, times=False)
+            options = OneRunOptions(record=recording.path_for("jump"), as_json=as_json)
             code = run_once(loaded, options, out, also={"asked": changes, "plan": planned, **about})
     raise typer.Exit(code)
 

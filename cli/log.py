@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 log = typer.Typer(
     name="log",
-    help="Inspect, export and repair recordings.",
+    help="Inspect, export, compare, merge and repair recordings, and import logs.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
 
-File = Annotated[Path, typer.Argument(help="The recording, a file .rrd.")]
+File = Annotated[Path, typer.Argument(help="The recording, a .rrd file.")]
 log.command("import")(import_log)
 
 
@@ -79,7 +79,8 @@ def export(
         typer.Option(help="Only this signal, port or block; may be given several times."),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--out", "-o", help="By default beside the recording.")
+        Path | None,
+        typer.Option("--out", "-o", help="The file to write; by default beside the recording."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,16 +13,25 @@ import yaml
 
 from ..mathematics.constants import GRAVITY
 from ..runtime.language.errors import AloftError
+from .logged_joints import (
+    OPEN,
+    LoggedJoints,
+    columns_of_joints,
+    commented,
+    lists_of_joints,
+    name_joints,
+)
 from .shared.options import AsJson
 from .shared.output import console, errors_reported, print_json, say, table
 
 if TYPE_CHECKING:
+    from ..hal.log.log_file import LogFile
     from ..robots.robot_description import RobotDescription
 
 _WORDS: Mapping[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
     "time": (("stamp", "time"), (1,)),
     "angular_velocity": (("angular_velocity", "gyro", "omega"), (3,)),
-    "specific_force": (("linear_acceleration", "accel", "imuacc", "acc"), (3,)),
+    "specific_force": (("specific_force", "linear_acceleration", "accel", "imuacc", "acc"), (3,)),
     "joint_position": (
         ("joint_position", "jointspos", "joint_states.position", "position", "pos", "q"),
         (),
@@ -59,6 +69,12 @@ def import_log(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="The graph; by default named like the log.")
     ] = None,
+    joints: Annotated[
+        str,
+        typer.Option(
+            help="The joints' names in the columns' order, with commas between; - for a column that is none."
+        ),
+    ] = "",
     force: Annotated[bool, typer.Option(help="Overwrite an existing graph.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -72,16 +88,24 @@ def import_log(
             raise AloftError(str(error)) from None
         widths = {name: each.values.shape[1] for name, each in found.arrays.items()}
         described = described_robot(robot)
-        guessed = guess(widths, None if described is None else len(described.joints))
+        given = [name.strip() for name in joints.split(",")] if joints else []
+        guessed = guess(widths, _numbers_of_joints(found, described, given))
+        if described is not None and "joint_position" not in guessed:
+            guessed = guess(widths)
+        own = {} if described is None else columns_of_joints(widths, described)
         forces = {} if described is None else forces_of_feet(widths, described)
         target = out or file.with_suffix(".yaml")
         if target.exists() and not force:
             raise AloftError(f"{target} exists; --force overwrites it, --out names another")
         own_stamps = any(each.stamps is not None for each in found.arrays.values())
-        graph = graph_of(file, robot, guessed, own_stamps)
+        graph = graph_of(_beside(target, file), robot, guessed, own_stamps)
+        played = graph["blocks"]["robot"]["with"]
+        if own:
+            played["joints"] = own
+            guessed = {k: v for k, v in guessed.items() if not k.startswith("joint_")}
         if described is not None and forces:
             weight = GRAVITY * described.total_mass
-            graph["blocks"]["robot"]["with"]["contacts"] = {
+            played["contacts"] = {
                 foot: {
                     "force": column,
                     "closes": f"{_CLOSES * weight:.0f} N",
@@ -90,10 +114,31 @@ def import_log(
                 for foot, column in forces.items()
             }
         guessed |= {f"force of {foot}": column for foot, column in forces.items()}
-        head = "# Guessed by `aloft log import` from names and widths: look at each column, unit and foot.\n"
-        target.write_text(head + yaml.safe_dump(graph, sort_keys=False), encoding="utf-8")
+        notes = _arrivals(found, played)
+        named = LoggedJoints()
+        if "joints" in played:
+            named = name_joints(found, played, described, given)
+            if named.names is not None:
+                played["joints"] = {**played["joints"], "names": named.names}
+        elif given:
+            raise AloftError(f"--joints: {file.name} has no columns of joints' angles")
+        notes += named.notes
+        if named.sensor is not None:
+            played["imu"]["sensor"] = named.sensor
+        head = "# Guessed by `aloft log import`: look at each column, unit and foot.\n"
+        text = commented(yaml.safe_dump(graph, sort_keys=False, width=200), named)
+        target.write_text(head + text, encoding="utf-8")
     if as_json:
-        print_json({"graph": str(target), "columns": widths, "guessed": guessed})
+        columns = [vars(each) for each in named.columns]
+        print_json(
+            {
+                "graph": str(target),
+                "columns": widths,
+                "guessed": guessed,
+                "joints": columns,
+                "notes": notes,
+            }
+        )
         return
     meaning = {
         column: what
@@ -105,7 +150,47 @@ def import_log(
         for name, each in found.arrays.items()
     ]
     console().print(table(str(file), ("column", ">rows", ">width", "unit", "guessed as"), rows))
+    if {each.sure for each in named.columns} - {"named", "given"}:
+        joined = [(each.column, each.joint or OPEN, each.sure, each.why) for each in named.columns]
+        console().print(table("joints", ("column", "joint", "how sure", "why"), joined))
+    for note in notes:
+        say(console(), note)
     say(console(), f"wrote {target}: look at each part, then `aloft check {target}`")
+
+
+def _numbers_of_joints(
+    log: LogFile, robot: RobotDescription | None, given: list[str]
+) -> tuple[int, ...]:
+    """Return how many columns a quantity of the joints may have; empty if nothing says so."""
+    if given:
+        return (len(given),)
+    listed = {len(names) for names in lists_of_joints(log.texts, robot).values()}
+    return tuple(listed) or (() if robot is None else (len(robot.joints),))
+
+
+def _beside(graph: Path, file: Path) -> Path:
+    """Return a log's path from the folder of a graph."""
+    return Path(os.path.relpath(file.resolve(), graph.parent.resolve()))
+
+
+def _arrivals(log: LogFile, played: dict[str, Any]) -> list[str]:
+    """Take stamps whose steps vary much for arrival times, and say so."""
+    from ..hal.log.columns import MOST_JITTER, LogClock, moments_of
+    from ..hal.log.log_file import LogError
+
+    if "clock" not in played:
+        return []
+    rows = len(log.array(played["clock"]["stamps"]).values)
+    try:
+        jitter = moments_of(log, LogClock.model_validate(played["clock"]), rows, None).jitter
+    except LogError as error:
+        return [str(error)]
+    if jitter <= MOST_JITTER:
+        return []
+    played["clock"]["even"] = True
+    return [
+        f"the steps between stamps vary by {100.0 * jitter:.0f} %: they are taken for arrival times, rows evenly apart (clock.even)"
+    ]
 
 
 def described_robot(robot: Path | None) -> RobotDescription | None:
@@ -136,7 +221,7 @@ def _side(name: str) -> str | None:
     return next((_SIDES[word] for word in words if word in _SIDES), None)
 
 
-def guess(widths: Mapping[str, int], joints: int | None = None) -> dict[str, Guess]:
+def guess(widths: Mapping[str, int], joints: Collection[int] = ()) -> dict[str, Guess]:
     """Guess the column of each quantity, by the words in its name and its width.
 
     Columns of one number that differ by a number only (``pos_meas1``, ``pos_meas2``) are one quantity. What was measured
@@ -144,8 +229,7 @@ def guess(widths: Mapping[str, int], joints: int | None = None) -> dict[str, Gue
 
     Args:
         widths: numbers of each column, by its name.
-        joints: how many joints the robot has; without it a quantity of joints has more than four
-            numbers, or is of numbered columns.
+        joints: how many numbers a quantity of the joints may have; without it more than four, or it is of numbered columns.
 
     Returns:
         The column, or the columns in order, by quantity.
@@ -182,11 +266,11 @@ def numbered(widths: Mapping[str, int]) -> dict[str, list[str]]:
 
 
 def _of_joints(
-    name: str, widths: Mapping[str, int], series: Mapping[str, list[str]], joints: int | None
+    name: str, widths: Mapping[str, int], series: Mapping[str, list[str]], joints: Collection[int]
 ) -> bool:
     """Tell whether a column may have a number for each joint."""
-    if joints is not None:
-        return widths[name] == joints
+    if joints:
+        return widths[name] in joints
     return widths[name] > 4 or name in series
 
 
@@ -211,7 +295,7 @@ def graph_of(
 ) -> dict[str, Any]:
     """Return a graph that plays what was guessed, estimates the base where there is an IMU, and scores that
     where there is a truth."""
-    played: dict[str, Any] = {"file": file.name}
+    played: dict[str, Any] = {"file": str(file)}
     if "time" in guessed and not own_stamps:
         played["clock"] = {"stamps": guessed["time"]}
     if "joint_position" in guessed:

@@ -39,13 +39,14 @@ class PlanLibraryOptions:
     """The library of plans, and what becomes of the plans in it."""
 
     keep: Annotated[
-        Path | None, typer.Option(help="Library folder plans are kept in; default: your cache.")
+        Path | None,
+        typer.Option(help="The library's folder, where plans are kept; by default your cache."),
     ] = None
     anew: Annotated[
         bool,
         typer.Option(
             "--anew",
-            help="Ignore stored plans and solve from nothing; in a grid: retry what failed before.",
+            help="Ignore stored plans and solve from scratch; in a grid: retry what failed before.",
         ),
     ] = False
     listed: Annotated[bool, typer.Option("--list", help="List the stored plans.")] = False

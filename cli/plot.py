@@ -23,12 +23,12 @@ _DOTS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
 
 
 def plot(
-    run: Annotated[Path, typer.Argument(help="The recording, a file .rrd.")],
+    run: Annotated[Path, typer.Argument(help="The recording, a .rrd file.")],
     signals: Annotated[
         list[str],
         typer.Argument(
-            help="block.port.field, all fields of block.port, or one element: a.b.c[2]; more "
-            "recordings first are drawn over the same axes."
+            help="block.port.field, all fields of block.port, or one element: a.b.c[2]. Further "
+            "recordings, named before the signals, are drawn over the same axes."
         ),
     ],
     png: Annotated[Path | None, typer.Option("--png", help="Draw into this PNG file.")] = None,

@@ -38,8 +38,8 @@ def replay(
     inputs: Annotated[
         Literal["auto", "seed", "recorded"],
         typer.Option(
-            help="seed: run everything; recorded: feed what came from outside the graph, robot or "
-            "simulator, from the recording; auto: seed for a simulation."
+            help="seed: run everything again; recorded: take what came from outside the graph, from a "
+            "robot or simulator, from the recording; auto: seed for a simulation, else recorded."
         ),
     ] = "auto",
     first: Annotated[

@@ -70,22 +70,24 @@ class ObservationOptions:
     ] = 0
     split: Annotated[
         str,
-        typer.Option(help="Go on in a new recording after this time of the graph, e.g. '10 min'."),
+        typer.Option(
+            help="Continue in a new recording after every such time of the graph, e.g. '10 min'."
+        ),
     ] = ""
     no_record: NoRecord = False
     params: Annotated[
         str,
         typer.Option(
-            help="Let `aloft params` reach this run by that name; a run in real time is reached "
-            "by its graph's name anyway. 'none': not at all."
+            help="The name by which `aloft params` reaches this run; by default that of the graph if "
+            "the run is in real time. 'none': not at all."
         ),
     ] = ""
     paused: Annotated[
         bool,
         typer.Option(
             "--paused",
-            help="Begin paused and wait at the end, for the page of `aloft graph --live`, where the "
-            "run goes on and back.",
+            help="Begin paused and wait at the end: the page of `aloft graph --live` lets the run go "
+            "on, step and go back.",
         ),
     ] = False
 
@@ -116,7 +118,9 @@ class PartOptions:
     ] = False
     keys: Annotated[
         Path | None,
-        typer.Option(help="The folder of `aloft keys`, or this machine's own: links over TLS."),
+        typer.Option(
+            help="Links over TLS: the folder that `aloft keys` wrote, or this machine's part of it."
+        ),
     ] = None
 
 
@@ -132,7 +136,7 @@ class CompilingOptions:
         bool,
         typer.Option(
             "--check-bounds",
-            help="Check every index of a kernel: compile nothing, so that one beyond its array fails.",
+            help="Compile nothing and check every index of a kernel: one beyond its array fails.",
         ),
     ] = False
     fuse: Annotated[bool, typer.Option(help="Run consecutive compiled blocks as one call.")] = True

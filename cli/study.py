@@ -76,8 +76,8 @@ def study(
 ) -> None:
     """Run a study: every graph, arm and grid point with every seed, on all cores.
 
-    Runs that were made before are not made again, so a study that was stopped or killed goes on
-    where it was. Settings are compared over equal seeds. 'aloft tune' searches the parameters of a
+    Runs that were made before are not made again, so a study that was stopped or killed continues
+    where it ended. Settings are compared over equal seeds. 'aloft tune' searches the parameters of a
     study's arms, 'aloft falsify' the worst case, and 'aloft sensitivity' ranks parameters. Exits with 0 when all goals are met, 1 when one is missed, 3 when a run broke.
 
     'aloft study paper' makes the runs of the paper's figures, draws them into docs (or --out), and

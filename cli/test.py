@@ -70,7 +70,7 @@ def test(
     trust: Trust = False,
     as_json: AsJson = False,
 ) -> None:
-    """Test blocks: that they keep what every block promises, and your own tests with pytest.
+    """Check that blocks keep what every block promises, and run your own tests with pytest.
 
     With --recording, write a test instead: the block's state, inputs and outputs in a stretch of a
     recorded run, which it must reproduce to the last bit.

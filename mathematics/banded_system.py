@@ -1,4 +1,5 @@
-"""The smallest weighted correction that fulfils linear equations whose variables follow each other in time.
+"""The smallest weighted correction that fulfils linear equations whose variables follow each other in time, and which
+bounds are equations.
 
 For equations A x = b, of which each touches only variables near its place, the smallest x'Wx is W^-1 A' y with
 (A W^-1 A') y = b. That matrix is positive and has few diagonals. It is kept by columns in blocks of ``TOGETHER``:
@@ -228,3 +229,39 @@ def smallest_correction(
                 total += values[a] * vector[i]
         out[column] = inverse_weights[column] * total
     found[0] = True
+
+
+@kernel
+def keep_bounds(
+    variables: Array1D, lower: Array1D, upper: Array1D, inverse_weights: Array1D, left: Flags1D
+) -> None:
+    """Put variables that have left their bounds on them, where they stay; ``left`` (1,) tells whether there are any."""
+    left[0] = False
+    for k in range(variables.shape[0]):
+        limited = min(max(variables[k], lower[k]), upper[k])
+        if limited != variables[k]:
+            variables[k], inverse_weights[k], left[0] = limited, 0.0, True
+
+
+@kernel
+def hold_violated(
+    values: Array1D, lower: Array1D, upper: Array1D, tolerance: float, held: Flags1D,
+    place: Indices1D, count: Indices1D, vector: Array1D, violation: Array1D, touched: Flags1D,
+) -> None:  # fmt: skip
+    """Hold rows that are violated by more than the tolerance: ``place`` numbers those that are ``held``, (n_rows,) both, ``vector`` (``count``,) is what
+    they miss. ``violation`` (1,) is the largest of all, and ``touched`` (1,) tells whether new ones are held.
+    """
+    number, most = 0, -math.inf
+    touched[0] = False
+    for k in range(values.shape[0]):
+        below, above = lower[k] - values[k], values[k] - upper[k]
+        violated = max(below, above)
+        if not violated <= most and not math.isnan(most):  # a number that is none stays
+            most = violated
+        if violated > tolerance and not held[k]:
+            held[k], touched[0] = True, True
+        place[k] = number if held[k] else -1
+        if held[k]:
+            vector[number] = below if below > above else -above
+            number += 1
+    violation[0], count[0] = most, number

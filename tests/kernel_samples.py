@@ -224,6 +224,14 @@ UNUSED = {
         np.array([3]), 1e-12, np.zeros((3, 8)), np.array([1, 2, 2]), np.zeros(3, dtype=np.int64), NORMAL(3),
         np.zeros(4), np.zeros(1, dtype=np.bool_), np.zeros(1, dtype=np.bool_),
     ),
+    "aloft.mathematics.banded_system.keep_bounds": (
+        NORMAL(9), np.full(9, -0.5), np.full(9, 0.5), np.ones(9), np.zeros(1, dtype=np.bool_),
+    ),
+    "aloft.mathematics.banded_system.hold_violated": (
+        NORMAL(9), np.full(9, -0.5), np.full(9, 0.5), 1e-9, np.arange(9) % 3 == 0,
+        np.zeros(9, dtype=np.int64), np.zeros(1, dtype=np.int64), NORMAL(9), np.zeros(1),
+        np.zeros(1, dtype=np.bool_),
+    ),
     "aloft.mathematics.ground_surface.height_of_slope": (
         TERRAIN.slopes[0], 0.3, 0.4, np.zeros(3),
     ),
@@ -496,7 +504,6 @@ UNUSED |= {
     for each in vars(numpy_numbers).values()
     if is_kernel(each) and each.__module__ == numpy_numbers.__name__
 }
-UNUSED["aloft.blocks.scoring.estimator_score.heading"] = (np.array([0.1, 0.2, 0.3, 0.92]),)
 UNUSED["aloft.hal.simulated.physics_step.begin_flight_step"] = (
     np.zeros(1), JointResistance(np.array([0.1, 0.2]), np.array([0.3, 0.4])),
     JointResistance(np.zeros(2), np.zeros(2)), np.zeros(1, np.int64), np.ones(1, np.int64),

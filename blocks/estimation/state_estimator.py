@@ -52,6 +52,11 @@ _UNREST_TIME = 0.3
 _FIRST_UNREST = 0.1
 _LARGEST_UNREST = 0.3
 """The low-pass of the standing points' speed [s], and that speed [m/s] at a start in a step, and at most."""
+_SOLE_TIME = 1.0
+_LEAN_TIME = 2.0
+_LARGEST_LEAN = 0.1
+"""Time constants [s] of the correction of the tilt by a standing sole, and of the sole's mean tilt; and how far [rad] a
+sole may seem to tilt from its mean: one that tilts farther rolls. All after a start in a step."""
 _REST_TIME = 2.0
 """Time constant [s] with which the gyroscope's bias is learnt at rest after a step."""
 
@@ -67,6 +72,12 @@ class GroundTrust(Signal):
     aligned = Field(dtype="int64", text="ticks of alignment with the level ground")
     stepped = Field(dtype="bool", text="a point has been without contact since the start")
     unrest = Field(unit="m/s", text="speed at which the stillest point seems to move, low-passed")
+    lean = Field(
+        ("n_feet", 2),
+        unit="rad",
+        frame="world",
+        text="turn that would lay each sole flat, low-passed",
+    )
     age = Field(unit="s", text="time since the start in a step; infinite if the robot stood there")
 
 
@@ -95,6 +106,12 @@ class StateEstimatorParameters(InertialParameters):
     )
     tilt_time: float = live_parameter(
         1.0, unit="s", gt=0.0, text="time constant of the tilt correction by velocity, after a step"
+    )
+    flexion: float = live_parameter(
+        0.6,
+        ge=0.0,
+        le=1.0,
+        text="share of a sole's apparent tilt by which its leg is turned, after a start in a step",
     )
     bias_spread: float = live_parameter(
         0.01,
@@ -148,7 +165,9 @@ class StateEstimator(InertialEstimator):
 
     It starts at the first sample, or in a gantry when the first point touches the ground, with the robot standing on level ground, or ground of that ``slope``; or in a step,
     if a rate is above 0.5 rad/s, also with all points in contact: then only the points in contact are on the ground, they give the first velocity, the tilt is
-    theirs, or the accelerometer's where they lie in one line, and the result has a warning. The world's
+    theirs, or the accelerometer's where they lie in one line, and the result has a warning. From then on each sole that stands keeps its tilt: what
+    seems to change in it corrects the tilt within 1 s, and moves the leg's points by the share ``flexion``, for a leg yields
+    under its load and encoders do not see it. The world's
     origin is midway between the soles, and x is the heading of the feet; for feet of one contact point it is
     the heading of the pattern in which they stand. Yaw and horizontal position drift. After a jump
     the height of the ground is known only through the anchors. The block never waits and raises no
@@ -202,6 +221,8 @@ class StateEstimator(InertialEstimator):
                     estimate.orientation, scratch.force, constants.tilt_gain, scratch.vector
                 )
         set_point_positions(estimate, legs)
+        if trust.age < math.inf:
+            use_soles(estimate, trust, legs, params, constants, scratch)
         trusted, support = trust_points(estimate, trust, legs, params, constants, scratch)
         correct_motion(estimate, legs, params, constants, scratch, trusted, support)
         if trust.stepped:
@@ -296,6 +317,47 @@ def align_with_ground(
     limit(estimate.gyro_bias, 3.0 * params.bias_spread, estimate.gyro_bias)
     error[:] *= angle_gain
     rotate_in_world(estimate.orientation, error[0], error[1], error[2])
+
+
+@kernel
+def use_soles(
+    estimate: BaseEstimate,
+    trust: GroundTrust,
+    legs: LegKinematics,
+    params: StateEstimatorParameters,
+    constants: InertialConstants,
+    scratch: InertialScratch,
+) -> None:
+    """Correct the tilt by each sole that stands, and move its points to where they are if its leg has yielded.
+
+    A standing sole keeps its tilt. If it seems to change, the estimate tilts, or the leg yields under its load, which encoders
+    do not see. In both cases the leg's points are turned back about the base. What does not change, as the slope
+    of the ground, is left alone.
+    """
+    motion, points, owners = legs.motion, legs.points, legs.contacts.foot
+    error, place, standing, turned = scratch.error, scratch.vector, scratch.standing, scratch.middle
+    passing = constants.period / (_LEAN_TIME + constants.period)
+    for foot in range(trust.lean.shape[0]):
+        for point in range(standing.shape[0]):
+            standing[point] = points.active[point] and owners[point] == foot
+        flat = misalignment(
+            estimate.orientation, motion.points, standing, motion.forward, constants.gradient, error, place
+        )  # fmt: skip
+        if not flat:
+            continue
+        lean = trust.lean[foot]
+        lean[0] += passing * (error[0] - lean[0])
+        lean[1] += passing * (error[1] - lean[1])
+        x, y = error[0] - lean[0], error[1] - lean[1]
+        ratio = 1.0 + (x * x + y * y) / (_LARGEST_LEAN * _LARGEST_LEAN)
+        x, y = x / (ratio * ratio), y / (ratio * ratio)
+        gain = min(constants.period / _SOLE_TIME, 1.0)
+        rotate_in_world(estimate.orientation, gain * x, gain * y, 0.0)
+        turned[:] = estimate.orientation
+        rotate_in_world(turned, params.flexion * x, params.flexion * y, 0.0)
+        for point in range(standing.shape[0]):
+            if standing[point]:
+                rotate(turned, motion.points[point], points.places[point])
 
 
 @kernel

@@ -41,7 +41,8 @@ class LearningOptions:
     ladder: Annotated[
         bool,
         typer.Option(
-            "--ladder", help="With --learn: begin with smaller jumps, from 2 cm, then half as far."
+            "--ladder",
+            help="With --learn: begin with smaller jumps: from 2 cm high in place, then half as far.",
         ),
     ] = False
 

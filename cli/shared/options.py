@@ -90,7 +90,7 @@ Trust = Annotated[
     bool,
     typer.Option(
         "--trust",
-        help="Run the code that the recording names and that is not aloft's; remembered for its content.",
+        help="Run the code outside aloft that the recording names; remembered until that code changes.",
     ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Only print pass or fail.")]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,14 @@ from .log_file import LogError, LogFile
 
 MOST_JITTER = 0.2
 """A spread of the steps between stamps, relative to their mean, above which they are arrival times."""
+MOST_APART = 0.5
+"""Rows of a robot's log are hardly so far apart [s]: larger steps are in another unit."""
+LATE = 1e-6
+"""A stamp may be so late and still be that of a tick [s]: floats of seconds since 1970 are rounded to a quarter of it."""
+GRAVITIES = {"g": 9.80665, "mg": 9.80665e-3}
+"""Accelerations in units that are gram and milligram elsewhere [m/s^2]."""
+COUNTER = 2.0**32
+"""Values of a counter of 32 bits, which begins again after them."""
 
 
 class LogColumns(Parameters):
@@ -38,12 +46,14 @@ Columns = str | list[str] | LogColumns
 
 
 class LogClock(Parameters):
-    """When the rows were taken: by stamps, by an even grid between the first and the last, or at a rate."""
+    """Times of the rows: by stamps, by an even grid between the first and the last, or at a rate."""
 
     stamps: str | None = parameter(
         None, text="the column of stamps; none: the file's own, of each topic"
     )
-    unit: str = parameter("s", text="of the stamps, such as ns")
+    unit: str | None = parameter(
+        None, text="of the stamps, such as ns; none: what the file says, or s"
+    )
     even: bool = parameter(
         False,
         text="rows are evenly apart from the first stamp to the last: stamps are arrival times",
@@ -51,99 +61,193 @@ class LogClock(Parameters):
     rate: float | None = parameter(
         None, unit="Hz", gt=0.0, text="rows a second, in place of stamps"
     )
+    sort: bool = parameter(
+        False, text="rows that are out of order in the file are put in that of their stamps"
+    )
+
+
+class Moments(NamedTuple):
+    """The moments of rows: ``times`` (n,) [s] since the first stamp, in the file's order, or in that of ``order`` (n,).
+
+    ``jitter`` is the standard deviation of the stamps' steps relative to their mean, ``wraps`` how often their counter began
+    again, ``shift`` [s] the median distance of an even grid from the stamps.
+    """
+
+    times: Array1D
+    order: Indices1D | None = None
+    jitter: float = 0.0
+    wraps: int = 0
+    shift: float = 0.0
+
+
+Units = str | Sequence[str] | Mapping[int, Sequence[str]]
+"""A unit of all columns, one of each, or those of each by how many columns there are."""
 
 
 def numbers(
-    log: LogFile, columns: Columns, count: int | None, unit: str
-) -> tuple[Array, Array | None]:
-    """Return the numbers (n, k) of columns in ``unit``, and their own stamps (n,) [s] if the file has some.
+    log: LogFile, columns: Columns, units: Units, count: int | None = None
+) -> tuple[Array, Array1D | None]:
+    """Return the numbers (n, k) of columns, and their own stamps (n,) [s] if the file has some.
+
+    Args:
+        count: how many columns there must be, if ``units`` does not tell.
 
     Raises:
-        LogError: a column is missing, their number is not ``count``, they have different lengths, or
-            the unit is none or of another dimension.
+        LogError: a column is missing, their number is another, they differ in length or clock, or a unit is none or of another dimension.
     """
     spec = columns if isinstance(columns, LogColumns) else LogColumns(columns=columns)
-    names = [spec.columns] if isinstance(spec.columns, str) else spec.columns
+    names = names_of(columns)
+    if not names:
+        raise LogError("no column is named")
     found = [log.array(name) for name in names]
     lengths = {len(each.values) for each in found}
     if len(lengths) > 1:
         raise LogError(f"the columns {', '.join(names)} have different lengths: {sorted(lengths)}")
+    own = found[0].stamps
+    if any(_other(own, each.stamps) for each in found):
+        raise LogError(f"the columns {', '.join(names)} have clocks of their own")
     values = (
         found[0].values
         if len(found) == 1
         else np.concatenate([each.values for each in found], axis=1)
     )
-    if count is not None and values.shape[1] != count:
-        raise LogError(f"{', '.join(names)} has {values.shape[1]} columns, expected {count}")
     width = values.shape[1]
+    if isinstance(units, str):
+        units = [units] * (width if count is None else count)
+    by_width = units if isinstance(units, Mapping) else {len(units): units}
+    if width not in by_width:
+        expected = " or ".join(map(str, by_width))
+        raise LogError(f"{', '.join(names)} has {width} columns, expected {expected}")
     for what, given in (("scale", spec.scale), ("offset", spec.offset)):
         if len(given) not in (1, width):
             raise LogError(
                 f"{what} of {', '.join(names)} has {len(given)} numbers, expected 1 or {width}"
             )
-    factors = [
-        _factor(spec.unit or each.unit, unit, name)
+    said = [
+        (name, each.unit)
         for name, each in zip(names, found, strict=True)
         for _ in range(each.values.shape[1])
     ]
+    factors = [
+        _factor(spec.unit, unit, to, name)
+        for (name, unit), to in zip(said, by_width[width], strict=True)
+    ]
     if any(spec.offset) or {*spec.scale, *factors} != {1.0}:
         values = (values - np.array(spec.offset)) * np.array(spec.scale) * np.array(factors)
-    return values, found[0].stamps
+    return values, own
 
 
-def _factor(given: str | None, wanted: str, name: str) -> float:
-    """Return the factor from a column's unit to the one that is wanted."""
-    if given is None or not wanted:
+def names_of(columns: Columns) -> list[str]:
+    """Return the names of columns."""
+    names = columns.columns if isinstance(columns, LogColumns) else columns
+    return [names] if isinstance(names, str) else names
+
+
+def _other(own: Array1D | None, stamps: Array1D | None) -> bool:
+    """Tell whether columns of the same length have different stamps."""
+    if own is stamps:
+        return False
+    return own is None or stamps is None or not np.array_equal(own, stamps)
+
+
+def _factor(given: str | None, said: str | None, wanted: str, name: str) -> float:
+    """Return the factor to the unit that is wanted from the one that is given, or that the file says."""
+    unit = given or said
+    if unit is None or not wanted:
         return 1.0
+    expected = parse_unit(wanted)
+    if unit in GRAVITIES and expected.same_dimension(parse_unit("m/s^2")):
+        return GRAVITIES[unit]
     try:
-        found, expected = parse_unit(given), parse_unit(wanted)
+        found = parse_unit(unit)
     except UnitError as error:
-        raise LogError(f"unit of {name}: {error}") from None
+        fix = f"; the file says so, and `unit: {wanted}` beside `columns` says otherwise"
+        raise LogError(f"unit of {name}: {error}{'' if given else fix}") from None
     if not found.same_dimension(expected):
-        raise LogError(f"{name} is in {given}, expected a unit like {wanted}")
+        raise LogError(f"{name} is in {unit}, expected a unit like {wanted}")
     return found.factor_to(expected)
 
 
-def stamps_of(log: LogFile, clock: LogClock, rows: int, own: Array1D | None) -> Array1D:
-    """Return the time of each of ``rows`` rows [s], by the clock.
+def moments_of(log: LogFile, clock: LogClock, rows: int, own: Array1D | None) -> Moments:
+    """Return when each of ``rows`` rows was taken, by the clock.
 
     Raises:
         LogError: there are no stamps, as many of them as rows, or they do not rise.
     """
     if clock.rate is not None:
-        return np.arange(rows) / clock.rate
+        return Moments(np.arange(rows) / clock.rate)
+    wraps, order = 0, None
     if clock.stamps is not None:
-        try:
-            factor = parse_unit(clock.unit).factor_to(parse_unit("s"))
-        except UnitError as error:
-            raise LogError(f"clock.unit: {error}") from None
-        times = log.array(clock.stamps).values
-        if times.shape[1] != 1:
-            raise LogError(f"clock.stamps: {clock.stamps} has {times.shape[1]} columns, expected 1")
-        if len(times) != rows and own is None:
-            raise LogError(f"clock.stamps: {clock.stamps} has {len(times)} stamps for {rows} rows")
-        stamps = times[:, 0] * factor if len(times) == rows else own
-    else:
+        stamps, wraps = _column_of_stamps(log, clock.stamps, clock.unit, rows)
+    elif own is not None:
         stamps = own
-    if stamps is None:
+    else:
         raise LogError("the rows have no time: give clock.stamps, a column, or clock.rate")
+    if not np.isfinite(stamps).all():
+        row = int(np.argmin(np.isfinite(stamps)))
+        raise LogError(f"the stamps do not rise: row {row} has {stamps[row]}")
+    if clock.sort:
+        order = np.argsort(stamps, kind="stable")
+        stamps = stamps[order]
     steps = np.diff(stamps)
-    if not np.isfinite(stamps).all() or (steps < 0.0).any():
-        row = int(np.argmax(~(steps >= 0.0))) + 1
+    if (steps < 0.0).any():
+        row = int(np.argmax(steps < 0.0)) + 1
         raise LogError(
-            f"the stamps do not rise: row {row} has {stamps[row]:.9g} after {stamps[row - 1]:.9g}"
+            f"the stamps do not rise: row {row} is {-steps[row - 1]:.9g} s before row {row - 1}, the first of {int((steps < 0.0).sum())} that "
+            "go back. Where rows are only out of order in the file, clock.sort: true puts them right"
         )
-    if clock.even:
-        return np.linspace(stamps[0], stamps[-1], rows)
-    return np.asarray(stamps, np.float64)
+    if stamps[-1] <= stamps[0]:
+        raise LogError("the stamps do not rise: all are the same")
+    jitter = float(steps.std() / steps.mean())
+    if not clock.even:
+        return Moments(stamps, order, jitter, wraps)
+    even = np.linspace(stamps[0], stamps[-1], rows)
+    return Moments(even, order, jitter, wraps, float(np.median(np.abs(stamps - even))))
 
 
-def jitter_of(log: LogFile, clock: LogClock, rows: int, own: Array1D | None) -> float:
-    """Return the standard deviation of the steps between stamps relative to their mean; zero without stamps."""
-    if clock.rate is not None:
-        return 0.0
-    steps = np.diff(stamps_of(log, clock.model_copy(update={"even": False}), rows, own))
-    return float(steps.std() / steps.mean()) if steps.size and steps.mean() > 0.0 else 0.0
+def _column_of_stamps(log: LogFile, name: str, given: str | None, rows: int) -> tuple[Array1D, int]:
+    """Return a column of stamps [s] since its first, and how often their counter of 32 bits began again."""
+    column = log.array(name)
+    unit = given or column.unit
+    try:
+        factor = parse_unit(unit or "s").factor_to(parse_unit("s"))
+    except UnitError as error:
+        raise LogError(f"clock.unit: {error}") from None
+    if column.values.shape[1] != 1:
+        raise LogError(f"clock.stamps: {name} has {column.values.shape[1]} columns, expected 1")
+    if len(column.values) != rows:
+        raise LogError(f"clock.stamps: {name} has {len(column.values)} stamps for {rows} rows")
+    if column.whole is not None:
+        since, wraps = (column.whole - column.whole[0]).astype(np.float64), 0
+    else:
+        counts = column.values[:, 0]
+        since, wraps = counts - counts[0], 0
+        if np.ptp(counts) < COUNTER and (counts == np.floor(counts)).all():
+            again = np.cumsum(np.diff(counts, prepend=counts[0]) < -0.5 * COUNTER)
+            since, wraps = since + COUNTER * again, int(again[-1])
+    usual = usual_step(since)
+    if unit is None and usual > MOST_APART:
+        fits = [each for each, per in (("ms", 1e3), ("us", 1e6), ("ns", 1e9)) if usual < MOST_APART * per]  # fmt: skip
+        raise LogError(
+            f"clock.unit: {name} has steps of {usual:g}, hardly seconds, and the file names no unit; expected one, such as {fits[0] if fits else 'ns'}"
+        )
+    return since * factor, wraps
+
+
+def usual_step(stamps: Array1D) -> float:
+    """Return the median of the steps between stamps that differ; zero without any."""
+    steps = np.abs(np.diff(stamps))
+    steps = steps[steps > 0.0]
+    return float(np.median(steps)) if steps.size else 0.0
+
+
+def rows_to_keep(times: Array1D, values: Array) -> tuple[Flags, int, int]:
+    """Return which rows count (n,), how many are no numbers, and how many have the time of a later one, which counts."""
+    rows = np.flatnonzero(np.isfinite(values).all(axis=1))
+    last = np.diff(times[rows], append=np.inf) > 0.0
+    keep = np.zeros(len(times), bool)
+    keep[rows[last]] = True
+    return keep, len(times) - len(rows), len(rows) - int(last.sum())
 
 
 class TimedRows(NamedTuple):
@@ -171,8 +275,8 @@ class TimedRows(NamedTuple):
 
 
 def last_rows(stamps: Array1D, times: Array1D, hold: bool = False) -> Indices1D:
-    """Return the row at or before each time (m,), the first one before all stamps; where it holds, a stamp may be 1 ns late."""
-    late = 1e-9 if hold else 0.0
+    """Return the row at or before each time (m,), the first one before all stamps; where it holds, a stamp may be late."""
+    late = LATE if hold else 0.0
     found = np.searchsorted(stamps, times + late, side="right") - 1
     return np.clip(found, 0, len(stamps) - 1)
 

@@ -27,7 +27,8 @@ from ..robot import Robot
 from .columns import take_row
 from .log_file import LogError, LogFile, read_log
 from .parameters import LogParameters
-from .played_log import PlayedLog, PlayedRows, play
+from .played_log import play
+from .played_rows import PlayedLog, PlayedRows
 
 EXAMPLE = Path(__file__).with_name("example.csv")
 """Eleven rows of a gyroscope and an accelerometer at rest, made by hand."""
@@ -40,16 +41,20 @@ class LogRobot(Robot):
     A parameter names columns: an array (``imuAcc``), a column of one (``imuAcc[2]``), a list of columns, or
     ``{columns: ..., unit: deg, scale: [-1.0], offset: [0.0]}``. Units in a CSV's header, ``q1 [deg]``, are taken.
 
-    Joints are found by name; those that the log lacks stand at the description's ``held`` or standing angle. The
-    IMU's samples are turned to the base's axes and moved to its origin: f - w x (w x r) - w' x r, and from another link over the
-    joints between. A force becomes a
-    contact with two thresholds. Between rows it is linear, holds the last row, or is the mean over the tick before;
-    contacts always hold.
+    Joints are found by name; those that the log lacks stand at the description's ``held`` or standing angle. The IMU's samples are
+    turned to the base's axes and moved to its origin: f - w x (w x r) - w' x r, and from another link over the joints between. A
+    force becomes a contact with two thresholds. Between rows it is linear, holds the last row, or is the mean over the tick before;
+    contacts always hold. A stamp may be 1 us late and still be that of a tick.
 
-    **Time** is the log's by ``clock``: its stamps, an even grid between the first and the last of them, or a rate. The
-    metric ``log_jitter`` is the standard deviation of the stamps' steps relative to their mean: where it is large, stamps are arrival
-    times, and the even grid is right. ``health.imu_valid`` and ``joints_valid`` are false at samples that repeat the one before
-    exactly, as a sensor that was not renewed does, and in gaps of more than five rows; both are counted.
+    **Time** is the log's by ``clock``: its stamps, an even grid between the first and the last of them, or a rate. The metric
+    ``log_jitter`` is the standard deviation of the stamps' steps relative to their mean: where it is large, stamps are arrival times,
+    and the even grid is right. Whole numbers that fall back by 2^32 are a counter that began again. A run begins where all columns
+    have begun, and ends with the first that ends.
+
+    **Rows that are none**: what is no number, and a quaternion of zeros, is left out; of rows with one stamp the last counts.
+    ``health.imu_valid``, ``joints_valid`` and ``contacts_valid`` are false in gaps of more than five usual steps and where the log
+    has no such columns; the first two also at samples that repeat the one before exactly, as a sensor that was not renewed does.
+    Metrics count gaps and repeats, and the result warns of what is likely wrong: units, signs, thresholds, rows left out.
 
     Commands are not heard: a log cannot be controlled. A run ends with the log.
 
@@ -141,7 +146,7 @@ class LogRobot(Robot):
             contacts.closed[point] = rows.closed[i, point]
             truth.contact_touched[point] = rows.closed[i, point]
         health.stamp = clock.base_period * clock.tick
-        health.contacts_valid = True
+        health.contacts_valid = rows.contacts_valid[i]
         health.imu_valid = rows.imu_valid[i]
         health.joints_valid = rows.joints_valid[i]
         health.imu_age = rows.imu_age[i]

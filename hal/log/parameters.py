@@ -34,7 +34,7 @@ class LogJoints(Parameters):
 
     names: list[str] | str | None = parameter(
         None,
-        text="joints in the columns' order, or the file's list of them; none: the robot's joints",
+        text="joints in the columns' order, - for one that is none, or the file's list of them; none: the robot's joints",
     )
     position: Columns = parameter(text="a column for each joint [rad]")
     velocity: Columns | None = parameter(
@@ -67,7 +67,8 @@ class LogTruth(Parameters):
 
     position: Columns = parameter(text="three columns of the base's origin [m]")
     rpy: Columns | None = parameter(None, text="roll, pitch, yaw of the base [rad]")
-    quaternion: Columns | None = parameter(None, text="in place of them: x, y, z, w")
+    quaternion: Columns | None = parameter(None, text="in place of them: four columns")
+    order: Literal["xyzw", "wxyz"] = parameter("xyzw", text="of the quaternion's columns")
 
 
 class LogParameters(Parameters):

@@ -20,7 +20,7 @@ from ...robots.description import RobotDescription
 from ..models.euler_angles import coordinates_of, pose_of, twist_of, unwrapped
 from ..models.exact_dynamics import (
     ExactDynamics,
-    Segment,
+    Segments,
     dynamics_of,
     half_steps,
     joint_motions,
@@ -92,8 +92,8 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
     lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
     flown = [_flight(plan, lift_off, touchdown) for lift_off, touchdown in flights]
     single = half_steps(plan.position, plan.velocity, plan.time, plan.contact_force, lasting)
-    places, rates = dynamics.follow([*(one.segment for one in flown), *single])
-    behind = np.cumsum([len(one.segment.steps) for one in flown])
+    places, rates = dynamics.follow(Segments.joined([*(one.segments for one in flown), single]))
+    behind = np.cumsum([len(one.time) for one in flown])
     errors = tuple(
         (float(np.linalg.norm(places[last - 1, :3] - plan.position[end, :3])),
          float(rotation_between(places[last - 1, 3:7], plan.position[end, 3:7])))
@@ -136,8 +136,7 @@ def flight_knots(plan: PlannedJump) -> tuple[tuple[int, int], ...]:
     Raises:
         ValueError: there are more or fewer flights than jumps.
     """
-    lasting = np.diff(plan.time, append=plan.time[-1]) > 0.0
-    flying = np.flatnonzero((plan.phase == Phase.FLIGHT) & lasting)
+    flying = np.flatnonzero((plan.phase[:-1] == Phase.FLIGHT) & (np.diff(plan.time) > 0.0))
     found = [
         (int(run[0]), int(run[-1]) + 1)
         for run in np.split(flying, np.flatnonzero(np.diff(flying) > 1) + 1)
@@ -156,7 +155,7 @@ def flight_knots(plan: PlannedJump) -> tuple[tuple[int, int], ...]:
 class _Flight:
     """A whole flight: time and interval of the end of every step, (n_steps,)."""
 
-    segment: Segment
+    segments: Segments
     time: Array
     knot: NDArray[np.int64]
 
@@ -177,11 +176,12 @@ def _flight(plan: PlannedJump, lift_off: int, touchdown: int) -> _Flight:
     of_halves = np.concatenate([[lift_off], np.repeat(knots, 2)])
     joints = joint_motions(plan.position, plan.velocity, plan.time, of_halves)
     angles, speeds, _ = joints.at(np.concatenate(passed)[:, None])
-    segment = Segment(
-        plan.position[lift_off, :7], plan.velocity[lift_off, :6], angles, speeds,
-        np.zeros(plan.contact_force.shape[1:]), np.concatenate(steps),
+    first = slice(lift_off, lift_off + 1)
+    segments = Segments(
+        plan.position[first, :7], plan.velocity[first, :6], angles, speeds,
+        np.zeros_like(plan.contact_force[first]), np.concatenate(steps), np.array([len(knots)]),
     )  # fmt: skip
-    return _Flight(segment, np.concatenate(times), np.array(knots))
+    return _Flight(segments, np.concatenate(times), np.array(knots))
 
 
 def held_joints(plan: PlannedJump, k: int) -> NDArray[np.bool_]:

@@ -8,6 +8,7 @@ which one is needed are Pinocchio's, with which tests compare the rest.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -72,15 +73,16 @@ class JointMotion(NamedTuple):
         return position, velocity, (2.0 * bend + 6.0 * u * twist) / (t * t)
 
 
-class Segment(NamedTuple):
-    """Motion over some steps under constant contact forces.
+class Segments(NamedTuple):
+    """Motions over some steps each under constant contact forces, n in all.
 
     Attributes:
-        base, twist: place and quaternion (7,) of the base at the beginning, and its velocity in its axes (6,).
-        angles, speeds: of the joints at the beginning, in the middle and at the end of every step,
-            (2 n_steps + 1, n_joints).
-        force: of the contacts [N, world], (n_contacts, 3).
+        base, twist: place and quaternion (n, 7) of the base at the beginnings, and its velocity in its axes (n, 6).
+        angles, speeds: of the joints at the beginning, in the middle and at the end of every step, of one motion behind
+            the other, (2 n_steps + n, n_joints).
+        force: of the contacts [N, world], (n, n_contacts, 3).
         steps: how long every step is [s], (n_steps,).
+        counts: the numbers of steps, (n,).
     """
 
     base: Array
@@ -89,6 +91,12 @@ class Segment(NamedTuple):
     speeds: Array
     force: Array
     steps: Array
+    counts: NDArray[np.int64]
+
+    @classmethod
+    def joined(cls, parts: Sequence[Segments]) -> Segments:
+        """Return some of them in a row."""
+        return cls(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 class FeetStates(NamedTuple):
@@ -450,25 +458,25 @@ class ExactDynamics:
         count = max(1, int(np.ceil(duration / longest_step - 1e-9)))
         h = duration / count
         angles, speeds, _ = joints.at(np.asarray(0.5 * h * np.arange(2 * count + 1)[:, None]))
-        segment = Segment(q[:7], v[:6], angles, speeds, force, np.full(count, h))
-        places, rates = self.follow([segment])
+        segment = Segments(
+            q[None, :7],
+            v[None, :6],
+            angles,
+            speeds,
+            force[None],
+            np.full(count, h),
+            np.array([count]),
+        )
+        places, rates = self.follow(segment)
         return [(h * (i + 1), places[i], rates[i]) for i in range(count)]
 
-    def follow(self, segments: list[Segment]) -> tuple[Array, Array]:
+    def follow(self, segments: Segments) -> tuple[Array, Array]:
         """Return the states after every step of all segments in turn: (n_steps, n_positions) and (n_steps,
         n_velocities).
         """
-        angles = np.concatenate([one.angles for one in segments])
-        speeds = np.concatenate([one.speeds for one in segments])
-        steps = np.concatenate([one.steps for one in segments])
-        counts = np.array([len(one.steps) for one in segments])
+        base, twist, angles, speeds, force, steps, counts = segments
         first = np.concatenate([[0], np.cumsum(counts)])
         of_step = np.repeat(np.arange(len(counts)), counts)
-        force = np.array([one.force for one in segments])
-        base, twist = (
-            np.array([one.base for one in segments]),
-            np.array([one.twist for one in segments]),
-        )
         seen = self._at_origin(angles, speeds)
         starts, ends = (
             2 * first[:-1] + np.arange(len(counts)),
@@ -552,15 +560,13 @@ def joint_motions(
 
 def half_steps(
     position: Array, velocity: Array, time: Array, force: Array, knots: NDArray[np.int64]
-) -> list[Segment]:
+) -> Segments:
     """Return the intervals of a plan from its states at some knots, each in two steps."""
     joints = joint_motions(position, velocity, time, knots)
     quarters = np.arange(5)[:, None, None] * (0.25 * joints.duration)
-    angles, speeds, _ = joints.at(np.asarray(quarters))
-    return [
-        Segment(
-            position[k, :7], velocity[k, :6], angles[:, i], speeds[:, i], force[k],
-            np.full(2, 0.5 * float(time[k + 1] - time[k])),
-        )
-        for i, k in enumerate(knots.tolist())
-    ]  # fmt: skip
+    angles, speeds, _ = (each.swapaxes(0, 1) for each in joints.at(np.asarray(quarters)))
+    return Segments(
+        position[knots, :7], velocity[knots, :6],
+        angles.reshape(-1, angles.shape[2]), speeds.reshape(-1, speeds.shape[2]), force[knots],
+        np.repeat(0.5 * (time[knots + 1] - time[knots]), 2), np.full(len(knots), 2),
+    )  # fmt: skip

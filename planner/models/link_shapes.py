@@ -19,6 +19,7 @@ from ...robots.kinematics import LinkPoses, from_base_outwards
 from ...robots.limb import chain_to
 from ...robots.shapes import convex, edges
 from ...robots.surfaces import quaternion_from_z
+from ..task.scaling import per_robot
 from .exact_dynamics import run_compiled
 
 FAR = 0.1
@@ -51,11 +52,13 @@ def moving_shapes(robot: RobotDescription, poses: LinkPoses, link: str) -> list[
     return [MovingShape(shape, *poses.of(link)) for shape in robot.link(link).shapes]
 
 
+@per_robot
 def legs(robot: RobotDescription) -> list[list[str]]:
     """Return the links of every leg, from the base outwards, legs in the order of the feet."""
     return [[robot.joints[k].child for k in chain_to(robot, foot.link)] for foot in robot.feet]
 
 
+@per_robot
 def arms(robot: RobotDescription) -> list[list[str]]:
     """Return the links of every limb that moves and has no foot, from the base outwards, limbs in the order of their
     joints.

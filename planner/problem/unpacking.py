@@ -122,12 +122,15 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
     middle[-1], moving[-1] = middle[-2], moving[-2]
     com, speed, momentum, torque = _evaluate(model, q, v, middle, moving, bend, force)
     torque[impacts] = 0.0
+    velocity, acceleration = twist_of(
+        *(np.stack(each) for each in ((q, middle), (v, moving), (bend, bend)))
+    )
     flights = [(float(times[f.start]), float(times[f.stop])) for f in problem.flights]
     return {
         "time": times,
         "position": pose_of(q),
-        "velocity": twist_of(q, v, bend)[0],
-        "acceleration": twist_of(middle, moving, bend)[1],
+        "velocity": velocity[0],
+        "acceleration": acceleration[1],
         "contact_force": force.reshape(count, -1, 3),
         "contact": grounded,
         "phase": np.array([*phases, phases[-1]], dtype=np.int64),
@@ -173,11 +176,14 @@ def _middles_in_flight(
 
 def can_start(problem: FullProblem, plan: PlannedJump) -> bool:
     """Check whether a plan goes through the same phases, so that ``pack`` can make variables of it."""
+    if _same_grid(problem, plan):
+        return True
     impacts = bool(np.any(np.diff(plan.time) <= 0.0)) or any(
         s.impact for s in problem.problem_phases
     )
-    alike = same_phases(plan.phase[:-1].tolist(), [int(phase) for phase in problem.phases])
-    return _same_grid(problem, plan) or (alike and not impacts)
+    return not impacts and same_phases(
+        plan.phase[:-1].tolist(), [int(phase) for phase in problem.phases]
+    )
 
 
 def _same_grid(problem: FullProblem, plan: PlannedJump) -> bool:

@@ -23,6 +23,7 @@ from ...mathematics.arrays import Array
 from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses, link_poses
+from ...robots.kinematics import ball_feet as feet_that_are_balls
 from ...robots.limb import chain_to
 from ...runtime.language.parameters import Parameters
 
@@ -50,14 +51,14 @@ def _text_of(robot: RobotDescription) -> str:
 
 def per_robot(function: _OfRobot[_Parameters, _Result]) -> _OfRobot[_Parameters, _Result]:
     """Call a function once for the same robot and arguments. What it returns must not be changed."""
-    kept: OrderedDict[str, _Result] = OrderedDict()
+    kept: OrderedDict[tuple[str, str], _Result] = OrderedDict()
 
     @wraps(function)
     def called(
         robot: RobotDescription, *args: _Parameters.args, **kwargs: _Parameters.kwargs
     ) -> _Result:
         # A description is not hashable, and two of the same content may be different objects.
-        key = f"{_text_of(robot)} {args} {sorted(kwargs.items())}"
+        key = _text_of(robot), f"{args} {sorted(kwargs.items())}"
         if key not in kept:
             kept[key] = function(robot, *args, **kwargs)
         kept.move_to_end(key)
@@ -67,6 +68,8 @@ def per_robot(function: _OfRobot[_Parameters, _Result]) -> _OfRobot[_Parameters,
 
     return called  # type: ignore[return-value]  # mypy types what wraps gives by itself
 
+
+ball_feet = per_robot(feet_that_are_balls)
 
 SAME_PLACE = 0.01
 """Contact points of a foot closer together than this [m], along it, are no heel and toe."""
@@ -78,6 +81,7 @@ PART_OF_STANDING = 0.8
 """Share of the standing robot's bend in the legs that is required where it stands on nearly straight ones."""
 
 
+@per_robot
 def toe_name_token(robot: RobotDescription) -> str:
     """Return the word that the names of the front contact points of all feet have in common and those of no other
     points have, such as ``toe``; empty where feet are no soles, or have no such word.

@@ -317,6 +317,7 @@ SCENES: Mapping[str, list[Scene]] = {
 
 
 IDLE = {
+    "blocks.StateEstimator": ["flexion"],
     "blocks.WholeBodyController": sorted(
         [
             *(f"{phase}.angular_by_size" for phase in ("landing", "stand", "thrust")),
@@ -331,7 +332,7 @@ IDLE = {
     ),
 }
 """One set of gains serves all phases: feet roll off and rise only in the thrust, and there none swings down. Weights are
-those of BRUCE, so its size changes none."""
+those of BRUCE, so its size changes none; and its soles are lines, whose tilt is not known."""
 
 
 def blocks_with_live_parameters() -> Iterator[str]:

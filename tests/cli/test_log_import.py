@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
 from aloft.cli.log_import import forces_of_feet, graph_of, guess, numbered
-from aloft.lab.studies.icub_estimators import write_robot
+from aloft.cli.logged_joints import columns_of_joints
+from aloft.hal.log.log_file import read_log
+from aloft.lab.studies.icub_estimators import JOINTS, write_robot
 from aloft.robots.description import find_robot
 from aloft.robots.robot_description import Foot
 from aloft.runtime.loading import LoadError, checked_file
 
 from ..shared_data import FOLDER, needs_icub
-from .conftest import run_for_json
+from ..stepping import BRUCE, NAMES, PERIOD, shuffled, stepping
+from .conftest import outcome, run_for_json
 
 PENDULUM = [
     "time", "pos_meas1", "pos_meas2", "pos_filt1", "pos_filt2", "pos_des1", "pos_des2",
@@ -23,13 +28,13 @@ PENDULUM = [
 
 
 def test_numbered_columns_are_one_quantity_and_the_measured_one_is_taken() -> None:
-    guessed = guess(dict.fromkeys(PENDULUM, 1), joints=2)
+    guessed = guess(dict.fromkeys(PENDULUM, 1), joints=[2])
     assert guessed == {
         "time": "time",
         "joint_position": ["pos_meas1", "pos_meas2"],
         "joint_torque": ["tau_meas1", "tau_meas2"],
     }
-    assert "joint_position" not in guess(dict.fromkeys(PENDULUM, 1), joints=3), "two are no three"
+    assert "joint_position" not in guess(dict.fromkeys(PENDULUM, 1), joints=[3]), "two are no three"
     graph = graph_of(Path("log.csv"), None, guessed, own_stamps=False)
     assert list(graph["blocks"]) == ["robot"], "without an IMU no base is estimated"
     joints = graph["blocks"]["robot"]["with"]["joints"]
@@ -81,26 +86,143 @@ def test_forces_go_to_the_foot_of_their_side(
     assert not forces_of_feet(dict.fromkeys(columns, 3), robot), "a vector is no normal force"
 
 
-@needs_icub
-def test_an_icubs_log_gets_its_contacts(tmp_path: Path) -> None:
-    robot, out = write_robot(tmp_path), tmp_path / "walk.yaml"
-    done = run_for_json(
-        "log",
-        "import",
-        str(FOLDER / "icub" / "walking.mat"),
-        "--robot",
-        str(robot),
-        "--out",
-        str(out),
+def imported(
+    file: Path, robot: Path | str, out: Path, *options: str
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return what `aloft log import` says, and what the graph plays."""
+    said = run_for_json(
+        "log", "import", str(file), "--robot", str(robot), "--out", str(out), *options
     )
-    assert done["guessed"]["force of l_sole"] == "lfForceZ"
-    graph = yaml.safe_load(out.read_text())
-    contacts = graph["blocks"]["robot"]["with"]["contacts"]
+    return said, yaml.safe_load(out.read_text())["blocks"]["robot"]["with"]
+
+
+@pytest.mark.long
+@needs_icub
+def test_an_icubs_log_gets_all_that_its_estimator_needs(tmp_path: Path) -> None:
+    pytest.importorskip("h5py")
+    said, played = imported(
+        FOLDER / "icub" / "walking.mat", write_robot(tmp_path), tmp_path / "walk.yaml"
+    )
+    assert said["guessed"]["force of l_sole"] == "lfForceZ"
+    contacts = played["contacts"]
     assert {foot: each["force"] for foot, each in contacts.items()} == {
         "l_sole": "lfForceZ",
         "r_sole": "rfForceZ",
     }
     assert contacts["l_sole"]["closes"] == "81 N", "a quarter of the weight of 33.1 kg"
+    assert played["joints"]["names"] == "estimatorJointsOrdering", "MATLAB's strings in the file"
+    assert [each["joint"] for each in said["joints"]] == JOINTS
+    assert {each["sure"] for each in said["joints"]} == {"named"}
+    assert played["imu"]["sensor"] == "root_link_imu_acc", (
+        "not at the base's origin, nor along its axes"
+    )
+    assert played["clock"] == {"stamps": "estimatorJointsTime", "even": True}
+    assert any("the feet stand still with these names" in note for note in said["notes"])
+    assert any("arrival times" in note for note in said["notes"])
+    checked_file(tmp_path / "walk.yaml")
+
+
+@pytest.mark.long
+@needs_icub
+@pytest.mark.parametrize("log", ["walking", "com-sinusoid"])
+def test_an_icubs_columns_without_names_are_told_by_its_feet_or_left_open(
+    tmp_path: Path, log: str
+) -> None:
+    pytest.importorskip("h5py")
+    arrays = read_log(FOLDER / "icub" / f"{log}.mat").arrays
+    file, out, robot = tmp_path / "log.npz", tmp_path / "log.yaml", write_robot(tmp_path)
+    np.savez(file, **{name: each.values for name, each in arrays.items()})
+    said, played = imported(file, robot, out)
+    names = played["joints"]["names"]
+    assert names[:14] == ["?"] * 14, "no foot tells arms, torso and neck"
+    assert names[14:] == JOINTS[14:], "both legs"
+    sure = [each["sure"] for each in said["joints"]]
+    assert set(sure[14:]) == {"told", "likely"} and set(sure[:14]) == {"open"}
+    assert all(name in said["joints"][k]["why"] for k, name in enumerate(JOINTS[:14])), (
+        "among what limits leave"
+    )
+    assert played["imu"]["sensor"] == "root_link_imu_acc"
+    assert "- l_knee  # estimatorJointsPos[17]: " in out.read_text()
+    with pytest.raises(LoadError) as caught:
+        checked_file(out)
+    text = str(caught.value)
+    assert (
+        "columns 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13 (the first is 0) have no joint's name yet"
+        in text
+    )
+    assert (
+        "as the driver's documentation has them" in text and "- for a column that is none" in text
+    )
+    known = ",".join(["-"] * 14 + JOINTS[14:])
+    again, played = imported(file, robot, out, "--joints", known, "--force")
+    assert {each["sure"] for each in again["joints"]} == {"given"}
+    checked_file(out)
+    crossed = (
+        known.replace("l_knee", "x").replace("l_hip_pitch", "l_knee").replace("x", "l_hip_pitch")
+    )
+    again, _ = imported(file, robot, out, "--joints", crossed, "--force")
+    assert any("look at the names of the legs' joints" in note for note in again["notes"]) == (
+        log == "walking"
+    )
+
+
+def standing_log(file: Path, order: np.ndarray) -> None:
+    """Write a log of BRUCE on one foot, then on the other, its columns in an order."""
+    motion = shuffled(stepping(2), order)
+    time = PERIOD * np.arange(len(motion.position))
+    force = dict(zip((foot.name for foot in BRUCE.feet), 60.0 * motion.closed.T, strict=True))
+    np.savez(
+        file, time=time, joint_position=motion.position, joint_velocity=motion.velocity, gyro=motion.rate,
+        specific_force=9.81 * motion.up, left_force_z=force["left_foot"], right_force_z=force["right_foot"],
+    )  # fmt: skip
+
+
+def test_shuffled_columns_of_a_log_get_their_joints(tmp_path: Path) -> None:
+    order = np.random.default_rng(2).permutation(len(NAMES))
+    standing_log(tmp_path / "log.npz", order)
+    said, played = imported(tmp_path / "log.npz", "bruce", tmp_path / "log.yaml")
+    names = played["joints"]["names"]
+    assert all(name in (NAMES[k], "?") for name, k in zip(names, order, strict=True))
+    assert names.count("?") <= 4, "hip and ankle of one leg, exchanged, move the base nearly alike"
+    assert [each["sure"] for each in said["joints"]] == [
+        "open" if name == "?" else "told" for name in names
+    ]
+    assert any("--joints NAME,NAME,..." in note for note in said["notes"]) == ("?" in names)
+
+
+@pytest.mark.parametrize(
+    ("given", "error"),
+    [
+        (",".join(NAMES[:-1]), "--joints has 9 names, expected 10: one for each column from joint_position[0] to joint_position[9]"),
+        (",".join(["left_kneee", *NAMES[1:]]), "the robot has no joint left_kneee; did you mean left_knee?"),
+    ],
+)  # fmt: skip
+def test_names_that_cannot_be_are_refused(tmp_path: Path, given: str, error: str) -> None:
+    standing_log(tmp_path / "log.npz", np.arange(len(NAMES)))
+    done = outcome(
+        "log", "import", str(tmp_path / "log.npz"), "--robot", "bruce", "--joints", given
+    )
+    assert done.returncode == 2 and error in " ".join((done.stdout + done.stderr).split())
+
+
+def test_columns_that_are_called_by_joints() -> None:
+    widths = dict.fromkeys(
+        [
+            "t",
+            "left_knee_pos",
+            "left_knee_vel",
+            "right_knee.position",
+            "right_knee.velocity",
+            "left_knee_tau",
+        ],
+        1,
+    )
+    assert columns_of_joints(widths, find_robot("bruce")) == {
+        "names": ["right_knee", "left_knee"],
+        "position": ["right_knee.position", "left_knee_pos"],
+        "velocity": ["right_knee.velocity", "left_knee_vel"],
+    }, "a torque of one of two is none"
+    assert not columns_of_joints({"left_knee_temperature": 1, "knee": 1}, find_robot("bruce"))
 
 
 STICK = """<mujoco><worldbody><body name="rod"><joint name="hinge" axis="0 1 0" range="-1 1"/>

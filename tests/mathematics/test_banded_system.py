@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from aloft.mathematics.banded_system import TOGETHER, smallest_correction
+from aloft.mathematics.banded_system import (
+    TOGETHER,
+    hold_violated,
+    keep_bounds,
+    smallest_correction,
+)
 
 BLOCKS, WIDTH, HEIGHT = 9, 5, 3
 
@@ -82,3 +87,28 @@ def test_a_row_without_a_variable_that_may_change_holds_nothing() -> None:
 def test_more_equations_than_variables_have_no_correction() -> None:
     matrix = np.random.default_rng(9).standard_normal((4, 3))
     assert not correct(matrix, np.ones(4), np.ones(3), np.ones(4, dtype=bool), band=8)[1]
+
+
+def test_variables_that_left_their_bounds_stay_on_them() -> None:
+    variables, weights, left = np.array([0.4, -2.0, 3.0]), np.ones(3), np.zeros(1, dtype=np.bool_)
+    keep_bounds(variables, np.full(3, -1.0), np.ones(3), weights, left)
+    assert variables.tolist() == [0.4, -1.0, 1.0]
+    assert weights.tolist() == [1.0, 0.0, 0.0]
+    assert left[0]
+    keep_bounds(variables, np.full(3, -1.0), np.ones(3), weights, left)
+    assert not left[0]
+
+
+@pytest.mark.parametrize("worst", [0.5, np.nan])
+def test_violated_rows_are_held_from_then_on(worst: float) -> None:
+    held, place, vector = np.array([False, True, False, False]), np.zeros(4, np.int64), np.zeros(4)
+    count, violation, touched = np.zeros(1, np.int64), np.zeros(1), np.zeros(1, dtype=np.bool_)
+    lower, upper = np.full(4, -1.0), np.ones(4)
+    for values, new in (([1.5, 0.2, 0.0, -1.2], True), ([0.9, 0.2, worst, -1.0], False)):
+        hold_violated(
+            np.array(values), lower, upper, 0.1, held, place, count, vector, violation, touched
+        )
+        assert place.tolist() == [0, 1, -1, 2]
+        assert touched[0] == new
+    assert vector[: count[0]] == pytest.approx([0.1, 0.8, 0.0])
+    np.testing.assert_equal(violation[0], worst if np.isnan(worst) else 0.0)

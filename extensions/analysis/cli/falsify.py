@@ -56,7 +56,7 @@ def falsify(
     """Search the worst case in a study's ranges of parameters, and make it simple (extra 'tune').
 
     The study says which parameters vary, how near a run is to failing, and perhaps whose smallest
-    value that fails is searched. A search that was stopped goes on where it was. Exits with 1 when a run fails.
+    value that fails is searched. A search that was stopped continues where it ended. Exits with 1 when a run fails.
     """
     from ....studies.journal import Journal
     from ....studies.reading import read_study

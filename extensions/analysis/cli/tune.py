@@ -29,7 +29,7 @@ def tune(
     """Search the best parameters of every arm of a study with Optuna (extra 'tune').
 
     The study says what is searched: ranges, graphs, seeds and the number of draws. A search that
-    was stopped goes on where it was. What is found goes into a file beside the study, from which 'aloft study FILE' takes it.
+    was stopped continues where it ended. What is found goes into a file beside the study, from which 'aloft study FILE' takes it.
     """
     from ....studies import tuning
     from ....studies.journal import Journal

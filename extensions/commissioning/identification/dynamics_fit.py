@@ -47,12 +47,12 @@ SPEED = 0.05
 CONSTANT_STD, LOAD_STD, AGE_STD = 0.1, 0.1, 0.004
 """Standard deviations, beforehand, of torque constants, of friction with load, and of the torques' age [s]."""
 LINK_STD = 1.0
-"""That of masses, moments and inertias, relative to the description's sizes."""
+"""Standard deviation of masses, moments and inertias, relative to the description's sizes."""
 FLOATING_LINK_STD = 0.3
 """The same of a floating base, whose many links most logs leave open, and many could take up what a log's errors are."""
 ROUNDS = 8
 MASS_STD = 0.002
-"""That of the whole mass, relative, where nothing weighs the robot."""
+"""Standard deviation of the whole mass, relative, where nothing weighs the robot."""
 LEAST_LEFT = 0.02
 """The share of a floating base's six equations that the ground's forces have to leave."""
 TOLD = 2.0

@@ -150,7 +150,7 @@ def log_of_graph(file: Path, block: str | None = None) -> tuple[MotionLog, Robot
 
 def _motion_of(pose: Array, twist: Array, period: float) -> Array:
     """Return the base's rate and specific force in its axes (n, 6), by pose (n, 7) and twist (n, 6) of motion capture."""
-    from ....hal.log.played_log import rotation_of
+    from ....hal.log.turns import rotation_of
 
     whole = np.gradient(twist[:, :3], period, axis=0)
     whole[:, 2] += GRAVITY

@@ -70,7 +70,7 @@ def steer(
             viewer = open_viewer(rerun, messages)
             default = Path("recordings") / f"{loaded.checked.name}.rrd"
             options = OneRunOptions(
-                record=None if no_record else record or default, as_json=as_json, times=False
+                record=None if no_record else record or default, as_json=as_json
             )
             code = run_once(
                 loaded, options, out, viewer=viewer, link=link, messages=messages, also=about

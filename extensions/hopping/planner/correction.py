@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....mathematics.arrays import Array
-from ....mathematics.banded_system import smallest_correction
+from ....mathematics.banded_system import hold_violated, keep_bounds, smallest_correction
 from ....mathematics.compiling.compile_calls import compile_calls
 from ....mathematics.compiling.kernel_call import KernelCall, aligned_zeros
 from ....planner.problem.problem import FullProblem
@@ -59,50 +59,50 @@ class Corrector:
     def __init__(self, problem: FullProblem) -> None:
         assembly = problem.assembly
         rows, variables = assembly.constraints, assembly.variables
-        self._variables, self._constraints = np.zeros(variables), ConstraintValues(assembly)
-        self._place, self._count = np.zeros(rows, dtype=np.int64), np.zeros(1, dtype=np.int64)
-        self._vector, self._step = np.zeros(rows), np.zeros(variables)
-        self._factorised, self._found = np.zeros((2, 1), dtype=np.bool_)
-        self._squares = squares_of_changes(problem)
-        self._inverse = self._squares.copy()
-        self._call = KernelCall(
+        self._constraints, self._squares = ConstraintValues(assembly), squares_of_changes(problem)
+        self._variables, self._lower, self._upper, self._inverse, self._step = np.zeros(
+            (5, variables)
+        )
+        self._row_lower, self._row_upper, vector = np.zeros((3, rows))
+        self._held, self._violation = np.zeros(rows, dtype=np.bool_), np.zeros(1)
+        self._left, self._touched, self._factorised, self._found = np.zeros((4, 1), dtype=np.bool_)
+        place, count = np.zeros(rows, dtype=np.int64), np.zeros(1, dtype=np.int64)
+        self._keep_bounds = KernelCall(
+            keep_bounds, self._variables, self._lower, self._upper, self._inverse, self._left
+        )
+        self._hold_violated = KernelCall(
+            hold_violated, self._constraints.values, self._row_lower, self._row_upper, TOUCHED, self._held,
+            place, count, vector, self._violation, self._touched,
+        )  # fmt: skip
+        self._correct = KernelCall(
             smallest_correction,
-            self._constraints.starts, self._constraints.rows, self._constraints.entries, self._inverse, self._place, self._count, REGULARISATION,
-            aligned_zeros((rows, BAND)), *np.zeros((2, rows), dtype=np.int64), self._vector, self._step,
+            self._constraints.starts, self._constraints.rows, self._constraints.entries, self._inverse, place, count, REGULARISATION,
+            aligned_zeros((rows, BAND)), *np.zeros((2, rows), dtype=np.int64), vector, self._step,
             self._factorised, self._found,
         )  # fmt: skip
-        compile_calls([self._call])
+        compile_calls([self._keep_bounds, self._hold_violated, self._correct])
 
     def correct(self, problem: FullProblem, guess: Array) -> Correction:
         """Return the nearest variables to the guess that fulfil the problem's constraints, as far as the steps lead."""
-        held = problem.row_lower == problem.row_upper
-        self._variables[:] = guess
-        self._inverse[:] = self._squares
+        self._variables[:], self._inverse[:] = guess, self._squares
+        self._lower[:], self._upper[:] = problem.lower, problem.upper
+        self._row_lower[:], self._row_upper[:] = problem.row_lower, problem.row_upper
+        self._held[:] = problem.row_lower == problem.row_upper
         self._constraints.set_parameters(problem.parameters)
-        limited, violation = np.empty_like(guess), np.inf
+        violation = np.inf
         for steps in range(STEPS + 1):
-            np.clip(self._variables, problem.lower, problem.upper, out=limited)
-            left = limited != self._variables
-            self._inverse[left] = 0.0
-            self._variables[:] = limited
+            self._keep_bounds.run()
             self._constraints.evaluate(self._variables)
-            before, values = violation, self._constraints.values
-            below, above = problem.row_lower - values, values - problem.row_upper
-            violated = np.maximum(below, above)
-            violation = float(violated.max())
+            self._hold_violated.run()
+            before, violation = violation, float(self._violation[0])
             if not violation > ENOUGH or violation > LOST or steps == STEPS:
                 return Correction(self._variables.copy(), steps, violation)
-            touched = (violated > TOUCHED) & ~held
             self._factorised[0] = violation < FAST * before < np.inf and not (
-                left.any() or touched.any()
+                self._left[0] or self._touched[0]
             )
-            held |= touched
             if not self._factorised[0]:
                 self._constraints.differentiate()
-            self._count[0] = held.sum()
-            self._place[:] = np.where(held, np.cumsum(held) - 1, -1)
-            self._vector[: self._count[0]] = np.where(below > above, below, -above)[held]
-            self._call.run()
+            self._correct.run()
             if not self._found[0]:
                 break
             self._variables += self._step

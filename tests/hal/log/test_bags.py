@@ -7,6 +7,8 @@ import pytest
 
 import aloft
 from aloft.hal.log.log_file import LogError, read_log
+from aloft.hal.log.parameters import LogParameters
+from aloft.hal.log.played_log import play
 from aloft.robots.description import find_robot
 
 from ...cli.conftest import run_here
@@ -18,10 +20,10 @@ from rosbags.typesys import Stores, get_typestore
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 JOINTS = [joint.name for joint in find_robot("bruce").joints]
 COUNT, PERIOD, LATE = 200, 0.005, 0.02
-"""Messages arrive so late that their arrival is another clock than their headers'."""
+"""Messages arrive so late at most that their arrival is another clock than their headers'."""
 
 
-def write_bag(folder, plugin, *, swap=False):
+def write_bag(folder, plugin, *, swap=False, frame="base"):
     """Write a bag with an IMU at rest and joints that turn by 0.1 rad/s times their number."""
     types = STORE.types
     time_type, header_type = types["builtin_interfaces/msg/Time"], types["std_msgs/msg/Header"]
@@ -35,8 +37,8 @@ def write_bag(folder, plugin, *, swap=False):
         for k in range(COUNT):
             time = PERIOD * k
             stamp = time_type(sec=10 + int(time), nanosec=round(1e9 * (time % 1.0)))
-            header = header_type(stamp=stamp, frame_id="base")
-            arrival = round(1e9 * (10.0 + time + LATE))
+            header = header_type(stamp=stamp, frame_id=frame)
+            arrival = round(1e9 * (10.0 + time + LATE / 8 * (k % 2)))
             message = types["sensor_msgs/msg/Imu"](
                 header, four(0.0, 0.0, 0.0, 1.0), nothing, vector(0.01 * k, 0.0, 0.0), nothing,
                 vector(0.0, 0.0, 9.81), nothing,
@@ -64,7 +66,7 @@ def test_a_bag_has_a_column_for_each_field_and_the_clock_of_its_headers(bag):
     log = read_log(bag)
     rates = log.array("imu_data.angular_velocity")
     assert rates.values[:, 0] == pytest.approx(0.01 * np.arange(COUNT))
-    assert rates.stamps == pytest.approx(10.0 + PERIOD * np.arange(COUNT), abs=1e-6)
+    assert rates.stamps == pytest.approx(PERIOD * np.arange(COUNT), abs=1e-9)
     assert log.array("imu_data.linear_acceleration[2]").values[:, 0] == pytest.approx(9.81)
     assert log.texts["joint_states.name"] == JOINTS
     assert log.array("joint_states.position").values.shape == (COUNT, len(JOINTS))
@@ -88,10 +90,26 @@ def test_a_bag_plays_the_robot(bag):
     assert result.metrics["log_jitter"] < 1e-3
 
 
+def test_a_bag_says_in_which_frame_its_imu_measures(tmp_path):
+    folder = write_bag(tmp_path / "bag", StoragePlugin.MCAP, frame="left_calf")
+    given = {"file": "bag", "imu": {"angular_velocity": "imu_data.angular_velocity",
+                                    "specific_force": "imu_data.linear_acceleration"}}  # fmt: skip
+    robot = find_robot("bruce")
+    played = play(read_log(folder), LogParameters.model_validate(given), robot, 0.01)
+    warning = "the IMU's messages are in the frame left_calf, and it is played at torso: imu.link: left_calf"
+    assert warning in played.warnings
+    given["imu"]["link"] = "left_calf"
+    played = play(read_log(folder), LogParameters.model_validate(given), robot, 0.01)
+    assert warning not in played.warnings
+
+
 def test_joints_that_change_their_order_are_refused(tmp_path):
     folder = write_bag(tmp_path / "bag", StoragePlugin.MCAP, swap=True)
-    with pytest.raises(LogError, match=r"joint_states\.name changes from message to message"):
-        read_log(folder)
+    log = read_log(folder)
+    assert log.array("imu_data.angular_velocity").values.shape == (COUNT, 3)
+    text = r"joint_states\.name changes from message to message, in row 101 first"
+    with pytest.raises(LogError, match=text):
+        log.array("joint_states.position")
 
 
 @pytest.mark.long
