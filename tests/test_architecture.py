@@ -29,7 +29,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "robots": ("files", "mathematics"),
     "runtime/language": ("files", "robots", "mathematics/compiling", "mathematics/kernel", "mathematics/arrays", "mathematics/elementary", "mathematics/ground_surface"),
     "runtime/running": (
-        "processes", "runtime/language", "robots", "mathematics/compiling",
+        "processes", "runtime/language", "robots", "mathematics/compiling", "mathematics/kernel", "mathematics/arrays",
     ),
     "runtime/loading": (
         "files", "runtime/background", "runtime/language", "runtime/placement", "runtime/transports/registry", "robots",

@@ -101,11 +101,11 @@ class _Topic:
             elif value.dtype.kind in "fiub":
                 yield path, value.ravel().astype(float).tolist()
         elif isinstance(value, list) and value and isinstance(value[0], str):
-            if self.texts.setdefault(path, value) != value and parent not in self.refused:
-                self.refused[parent] = (
-                    f"is not of the same parts all along: {path} changes from message to message, in row {len(self.stamps) - 1} first"
-                )
+            self._named(path, parent, value)
         elif isinstance(value, list) and value and _fields(value[0]) and len(value) <= MOST_WIDE:
+            for each in _fields(value[0]):
+                if isinstance(getattr(value[0], each), str):
+                    self._named(f"{path}.{each}", path, [getattr(part, each) for part in value])
             parts: dict[str, list[float]] = {}
             for part in value:
                 for inner, numbers in self._numbers(path, part):
@@ -114,11 +114,20 @@ class _Topic:
         elif _fields(value):
             yield from self._numbers(path, value)
 
+    def _named(self, path: str, parent: str, names: list[str]) -> None:
+        """Keep the names of a field's parts, which must be the same in every message."""
+        if self.texts.setdefault(path, names) != names and parent not in self.refused:
+            self.refused[parent] = (
+                f"is not of the same parts all along: {path} changes from message to message, in row {len(self.stamps) - 1} first"
+            )
+
     def put_into(self, log: LogFile) -> Indices1D:
         """Keep its columns, or why they are none, in a log; return its stamps [ns]."""
-        self.texts = {path: each for path, each in self.texts.items() if path not in self.refused}
-        log.texts.update(self.texts)
-        log.refused.update(dict.fromkeys(self.texts, "is text") | self.refused)
+        for path, names in self.texts.items():
+            self.refused.setdefault(path, "is text")
+            if path.rpartition(".")[0] not in self.refused:
+                log.texts[path] = names
+        log.refused.update(self.refused)
         if self.whole:
             log.refused[self.name] = self.whole
         rows = len(self.stamps)

@@ -154,6 +154,8 @@ def read_log(path: Path) -> LogFile:
     Raises:
         LogError: it cannot be read, or is larger than the memory allowed for it.
     """
+    if not path.exists():
+        raise LogError(f"cannot read {path.name}: there is no such file")
     module, _, function = _reader(path).partition(":")
     try:
         reader = getattr(import_module(f".{module}", __package__), function)
@@ -177,6 +179,10 @@ def read_log(path: Path) -> LogFile:
 
 def _reader(path: Path) -> str:
     if path.is_dir():
+        if path.suffix == ".bag":
+            raise LogError(
+                f"{path.name} is a folder that is called like a file of ROS 1: rename it"
+            )
         return "bags:read_bag"
     ending = path.suffix.lower()
     if ending == ".db3" or path.name.endswith((".db3.zstd", ".mcap.zstd")):
