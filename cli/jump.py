@@ -137,7 +137,7 @@ def jump(
         if many:
             code = run_many(path, settings, many, out, as_json)
         else:
-            options = OneRunOptions(record=recording.path_for("jump"), as_json=as_json, times=False)
+            options = OneRunOptions(record=recording.path_for("jump"), as_json=as_json)
             code = run_once(loaded, options, out, also={"asked": changes, "plan": planned, **about})
     raise typer.Exit(code)
 
@@ -267,7 +267,7 @@ def task_of(graph: Graph) -> JumpTask:
 
 def plan_of(task: JumpTask, graph: Graph, nearest: bool, out: Console) -> dict[str, Any]:
     """Plan the task as the graph will, show the plan, and return it as in ``aloft plan --json``."""
-    from .plan import plan_task
+    from .shared.planning import plan_task
 
     row = plan_task(task, library_of(graph), False, None, nearest, out, tests=False)
     if row["success"]:

@@ -2,18 +2,60 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..runtime.language.errors import AloftError
-from .shared.options import AsJson
+from .shared.options import AsJson, expand_option_groups
 from .shared.output import console, errors_reported, print_json, progress_bar, say
 from .shared.run_panels import run_panels
 from .shared.viewing import read
 
+if TYPE_CHECKING:
+    from ..studies.film import Camera
 
+
+@dataclass(frozen=True)
+class ViewOptions:
+    """The options of the pictures and of the camera."""
+
+    width: Annotated[
+        int, typer.Option(min=64, max=3840, help="Width of one run's picture [pixels].")
+    ] = 480
+    height: Annotated[
+        int, typer.Option(min=64, max=2160, help="Height of one run's picture [pixels].")
+    ] = 400
+    azimuth: Annotated[
+        float, typer.Option(help="Direction of view [deg]; 90 is along the world's y axis.")
+    ] = 135.0
+    elevation: Annotated[
+        float, typer.Option(help="Elevation of the view [deg]; negative looks down.")
+    ] = -9.0
+    distance: Annotated[
+        float,
+        typer.Option(min=0, help="Distance of the camera [m]; 0: the whole motion is in view."),
+    ] = 0.0
+    follow: Annotated[bool, typer.Option("--follow", help="The camera follows the robot.")] = False
+    no_forces: Annotated[bool, typer.Option("--no-forces", help="Draw no forces.")] = False
+    overlay: Annotated[
+        bool,
+        typer.Option("--overlay", help="Draw several runs into one picture, half transparent."),
+    ] = False
+
+    def camera(self) -> Camera:
+        """Return the camera that they ask for."""
+        from ..studies.film import Camera
+
+        return Camera(
+            self.width, self.height, self.azimuth, self.elevation, self.distance, self.follow,
+            not self.no_forces, self.overlay,
+        )  # fmt: skip
+
+
+@expand_option_groups
 def render(
     recordings: Annotated[
         list[Path], typer.Argument(help="One recording, or several to stand side by side.")
@@ -31,32 +73,12 @@ def render(
         float, typer.Option(min=0.001, help="Playback speed; 0.25 is slow motion.")
     ] = 0.5,
     rate: Annotated[float, typer.Option(min=1, max=120, help="Frames per second.")] = 20.0,
-    width: Annotated[
-        int, typer.Option(min=64, max=3840, help="Width of one run's picture [pixels].")
-    ] = 480,
-    height: Annotated[
-        int, typer.Option(min=64, max=2160, help="Height of one run's picture [pixels].")
-    ] = 400,
-    azimuth: Annotated[
-        float, typer.Option(help="Direction of view [deg]; 90 is along the world's y axis.")
-    ] = 135.0,
-    elevation: Annotated[
-        float, typer.Option(help="Elevation of the view [deg]; negative looks down.")
-    ] = -9.0,
-    distance: Annotated[
-        float,
-        typer.Option(min=0, help="Distance of the camera [m]; 0: the whole motion is in view."),
-    ] = 0.0,
-    follow: Annotated[bool, typer.Option("--follow", help="The camera follows the robot.")] = False,
-    no_forces: Annotated[bool, typer.Option("--no-forces", help="Draw no forces.")] = False,
+    *,
+    view: ViewOptions,
     caption: Annotated[
         list[str] | None,
         typer.Option(help="Caption of each run, in order; by default the recording's name."),
     ] = None,
-    overlay: Annotated[
-        bool,
-        typer.Option("--overlay", help="Draw several runs into one picture, half transparent."),
-    ] = False,
     plots: Annotated[
         list[str] | None,
         typer.Option("--plot", help="Plot this signal beside the runs: a.b.c[2]. Repeatable."),
@@ -64,7 +86,7 @@ def render(
     as_json: AsJson = False,
 ) -> None:
     """Draw a recording as a film or a picture: the robot, the forces, the phase."""
-    from ..studies.film import ENDINGS, Camera, Take, instants, pictures, write_film
+    from ..studies.film import ENDINGS, Take, instants, pictures, write_film
 
     with errors_reported(as_json):
         path = output or Path(f"{recordings[0].stem}.{'gif' if at is None else 'png'}")
@@ -79,7 +101,7 @@ def render(
         names = list(caption or [file.stem for file in recordings])
         if len(names) != len(recordings):
             raise AloftError(f"{len(recordings)} recordings, but {len(names)} captions")
-        camera = Camera(width, height, azimuth, elevation, distance, follow, not no_forces, overlay)
+        camera = view.camera()
         runs = [read(file) for file in recordings]
         takes = [Take(run, name, camera) for run, name in zip(runs, names, strict=True)]
         panels = run_panels(runs, names, plots or [], start, end)

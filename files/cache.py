@@ -1,4 +1,4 @@
-"""What is kept between runs in the user's cache folder: machine code, checked plans, tables.
+"""The user's cache folder, which keeps between runs machine code, checked plans and tables.
 
 Everything that is kept goes through ``Cache``. A file ends with a digest over its name and its content, so
 one that is damaged, cut off or exchanged for another is not used, and what it held is made anew. A file

@@ -22,7 +22,7 @@ UNITS: dict[str, dict[str, float]] = {
     "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2},
     "": {"": 1.0},
 }  # fmt: skip
-"""By the unit that a port has: units that files have, and the factor to it."""
+"""Units that files have with their factors, by the unit of a port."""
 STAMPS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 FORMATS = ("csv", "npz", "h5", "mat", "parquet", "mcap", "bag")
 TOPICS = {"imu": "/imu/data", "joints": "/joint_states", "truth": "/mocap/pose"}
@@ -51,7 +51,7 @@ class DrawnLog:
     seed: int
     kind: str
     stamps: dict[str, Numbers]
-    """By group, (n,) whole numbers or floats in ``unit``; of a bag in ns."""
+    """Of each group, (n,) whole numbers or floats in ``unit``; of a bag in ns."""
     unit: str
     quantities: dict[str, Quantity]
     params: dict[str, Any]
@@ -61,7 +61,7 @@ class DrawnLog:
     order: str = "xyzw"
     """Of the columns of a quaternion; ``quantities`` have x, y, z, w."""
     flaws: dict[str, str] = field(default_factory=dict)
-    """By quantity: the kind of mistake in its column."""
+    """The kind of mistake in a column, by quantity."""
 
 
 class Drawing:
@@ -181,6 +181,8 @@ class Drawing:
                 "position": self.chance.uniform(-0.1, 0.1, 3).round(3).tolist(),
                 "rpy": self.chance.uniform(-3.0, 3.0, 3).round(3).tolist(),
             }
+            if self.happens(0.3):
+                params["imu"]["link"] = self.one_of(*(joint.child for joint in self.robot.joints))
 
     def _quantity(
         self, drawn: DrawnLog, part: str, times: Numbers, unit: str, width: int

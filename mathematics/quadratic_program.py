@@ -49,9 +49,9 @@ SETTINGS: Mapping[str, Mapping[str, Any]] = {
         "eps_duality_gap_rel": 1e-9,
     },
 }
-"""What these solvers need to find the optimum and not a point near it, unless ``options`` say something else."""
+"""Settings with which these solvers find the optimum and not a point near it, unless ``options`` say something else."""
 FEASIBLE, STATIONARY, GAP = 1e-5, 1e-5, 1e-6
-"""What the optimality conditions may be off: constraints in their units or as a share of the bounds, the gradient of the
+"""Errors that the optimality conditions may have: constraints in their units or as a share of the bounds, the gradient of the
 Lagrangian as a share of its largest term, and the duality gap as a share of the cost, or absolute where that is below 1."""
 
 

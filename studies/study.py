@@ -108,7 +108,7 @@ class Tuning:
     least: str = ""
     """Between draws of the same number of successes, the one whose mean of this metric is less."""
     race: bool = False
-    """Whether draws that can no longer win are stopped."""
+    """True to stop draws that can no longer win."""
 
 
 @dataclass(frozen=True)

@@ -146,7 +146,7 @@ class Draw:
     least: float = math.nan
     """The mean of the metric that should be least; NaN where no run has it, or none is named."""
     stopped: bool = False
-    """Whether runs of it were left out, because it could no longer win."""
+    """True if runs of it were left out, because it could no longer win."""
 
 
 def tuning_cells(study: Study) -> list[Cell]:

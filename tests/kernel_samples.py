@@ -504,7 +504,6 @@ UNUSED |= {
     for each in vars(numpy_numbers).values()
     if is_kernel(each) and each.__module__ == numpy_numbers.__name__
 }
-UNUSED["aloft.blocks.scoring.estimator_score.heading"] = (np.array([0.1, 0.2, 0.3, 0.92]),)
 UNUSED["aloft.hal.simulated.physics_step.begin_flight_step"] = (
     np.zeros(1), JointResistance(np.array([0.1, 0.2]), np.array([0.3, 0.4])),
     JointResistance(np.zeros(2), np.zeros(2)), np.zeros(1, np.int64), np.ones(1, np.int64),

@@ -75,7 +75,7 @@ NOT_HOT = {
     "blocks.signals.robot.drive_conditions": "of an error byte, for people",
     "blocks.signals.robot.describe_conditions": "of an error byte, for people",
     "blocks.signals.robot.is_critical": "of an error byte, by integer arithmetic",
-    "hal.simulated.stance._millimetres": "for the text of an error, before a run",
+    "hal.simulated.start_check._millimetres": "for the text of an error, before a run",
     "hal.simulated.mujoco_robot._is_whole": "when a graph is loaded",
     "hal.simulated.mujoco_robot._nearest_step": "for the text of an error, when a graph is loaded",
     "hal.bear.measurement._first_lasting": "of plain numbers, in the driver's own Python",

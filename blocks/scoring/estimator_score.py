@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from math import sqrt
 from typing import Literal
 
-from ...mathematics.arrays import Array1D
-from ...mathematics.elementary import atan2, cos, sin
+from ...mathematics.elementary import cos, sin
 from ...mathematics.kernel import kernel
-from ...mathematics.rotations import conjugate, logarithm, multiply, rotate
+from ...mathematics.rotations import conjugate, logarithm, multiply, rotate, yaw
 from ...runtime.language.block import Block, Input, Metric, State
 from ...runtime.language.parameters import Parameters, parameter
 from ...runtime.language.signals import Field, Signal
@@ -174,7 +173,7 @@ def align_base(
     if not by_start:
         return
     if record.ticks == 0:
-        record.yaw = heading(truth.base_orientation) - heading(base.orientation)
+        record.yaw = yaw(truth.base_orientation) - yaw(base.orientation)
         record.start[:] = base.position
         record.true_start[:] = truth.base_position
     turn = scratch.turn
@@ -184,13 +183,6 @@ def align_base(
     scratch.position[:] += record.true_start
     rotate(turn, scratch.velocity, scratch.velocity)
     multiply(turn, scratch.orientation, scratch.orientation)
-
-
-@kernel
-def heading(orientation: Array1D) -> float:
-    """Return the yaw [rad] of the x axis of an orientation."""
-    x, y, z, w = orientation[0], orientation[1], orientation[2], orientation[3]
-    return atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
 
 
 @kernel

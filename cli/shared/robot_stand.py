@@ -77,9 +77,7 @@ def stand(
             code = run_many(path, settings, parse_seeds(running.seeds), out, as_json)
         else:
             loaded = load(path, overrides_for(loaded, settings, running.seed))
-            options = OneRunOptions(
-                record=recording.path_for("stand"), as_json=as_json, times=False
-            )
+            options = OneRunOptions(record=recording.path_for("stand"), as_json=as_json)
             also = {"asked": {"squat_depth": depth, "push_speed": speed}, **about}
             code = run_once(loaded, options, out, also=also)
     raise typer.Exit(code)

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
     from rich.table import Table
 
+    from ...logs.recording.recorder import Recorder
     from ...logs.recording.recorder_link import RecorderLink
     from ...logs.viewing.viewer import Viewer
     from ...runtime.language.stages import CheckedGraph
@@ -67,7 +68,6 @@ class OneRunOptions:
         keep: how many earlier recordings of that name are kept.
         split: the time of the graph after which a new recording begins [s]; zero: never.
         as_json: whether one JSON object is printed.
-        times: whether the times of blocks are printed.
         verbose: whether all metrics and the times of blocks are printed.
         traceback: whether the whole traceback of a block that fails is printed.
         plain: whether nothing is compiled.
@@ -79,7 +79,6 @@ class OneRunOptions:
     keep: int = 0
     split: float = 0.0
     as_json: bool = False
-    times: bool = True
     verbose: bool = False
     traceback: bool = False
     plain: bool = False
@@ -127,38 +126,54 @@ def run_once(
                 plain=options.plain, fuse=options.fuse,
                 real_time=options.real_time or NO_REAL_TIME,
             )  # fmt: skip
-    recording = recorder.recording if recorder is not None else None
-    problem = recorder.problem if recorder is not None and record is not None else ""
-    missing, about_files = "", []
-    if recorder is not None and recording is not None:
-        missing = f" ({recorder.missing} ticks are not in it)" if recorder.missing else ""
-        if recorder.files:
-            names = ", ".join(file.name for file in recorder.files)
-            about_files.append(f"the recording is in {len(recorder.files)} files: {names}")
-        about_files += [recorder.before] if recorder.before else []
+    kept = _kept_recording(recorder, record) if recorder is not None else KeptRecording()
     files = [str(file) for file in recorder.files] if recorder is not None else []
     return report_run(
-        out, graph.checked, result, as_json=as_json, traceback=options.traceback,
-        times=options.times, verbose=options.verbose, recording=recording, missing=missing, about_files=about_files,
-        problem=problem, first=also or {},
+        out, graph.checked, result, kept, as_json=as_json, traceback=options.traceback,
+        verbose=options.verbose, first=also or {},
         last={"warnings": [*messages, *result.warnings], "files": files, **graph.about()},
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class KeptRecording:
+    """The recording of a run, as it is reported.
+
+    Attributes:
+        path: where it is, if there is one.
+        problem: what of it is missing, as an error; empty if nothing is.
+        missing: printed behind the path.
+        lines: printed below that.
+    """
+
+    path: Path | None = None
+    problem: str = ""
+    missing: str = ""
+    lines: Sequence[str] = ()
+
+
+def _kept_recording(recorder: Recorder, record: Path | None) -> KeptRecording:
+    problem = recorder.problem if record is not None else ""
+    if recorder.recording is None:
+        return KeptRecording(problem=problem)
+    missing = f" ({recorder.missing} ticks are not in it)" if recorder.missing else ""
+    lines = [recorder.before] if recorder.before else []
+    if recorder.files:
+        names = ", ".join(file.name for file in recorder.files)
+        lines.insert(0, f"the recording is in {len(recorder.files)} files: {names}")
+    return KeptRecording(recorder.recording, problem, missing, lines)
 
 
 def report_run(
     out: Console,
     graph: CheckedGraph,
     result: RunResult,
+    recording: KeptRecording,
     *,
     as_json: bool,
     traceback: bool,
-    recording: Path | None,
-    problem: str,
-    times: bool = True,
     verbose: bool = True,
     tables: Sequence[Table] = (),
-    missing: str = "",
-    about_files: Sequence[str] = (),
     warnings: Sequence[str] = (),
     first: Mapping[str, Any] = {},
     last: Mapping[str, Any] = {},
@@ -166,13 +181,9 @@ def report_run(
     """Print the result of a run, in one process or on several machines, for people or as JSON.
 
     Args:
-        recording: where the recording is, if there is one.
-        problem: what of the recording is missing, as an error; empty if nothing is.
-        times: whether the times of the blocks are printed.
-        verbose: whether these and all metrics are printed.
+        recording: its recording.
+        verbose: whether all metrics and the times of blocks are printed.
         tables: printed behind the metrics.
-        missing: behind the path of the recording.
-        about_files: lines behind that.
         warnings: printed beside those of the blocks.
         first: what the JSON object has before the result.
         last: what it has behind the result, or in place of entries of it.
@@ -182,18 +193,19 @@ def report_run(
     """
     from .viewing import how_to_view
 
+    path, problem = recording.path, recording.problem
     code = code_with_recording(result.exit_code, problem)
-    print_result(out, graph.name, result, times=times, verbose=verbose)
+    print_result(out, graph.name, result, verbose=verbose)
     for each in tables:
         out.print(each)
-    if recording is not None:
-        say(out, f"recording: {recording}{missing}; to see it: {how_to_view(recording)}")
-    for line in about_files:
+    if path is not None:
+        say(out, f"recording: {path}{recording.missing}; to see it: {how_to_view(path)}")
+    for line in recording.lines:
         say(out, line)
     for warning in (*result.block_warnings, *result.stop_problems, *warnings):
         print_warning(warning)
     if as_json:
-        about = {**result.to_json(), "recording": str(recording) if recording else None}
+        about = {**result.to_json(), "recording": str(path) if path else None}
         about |= {"exit_code": int(code), "recording_problem": problem or None, **last}
         print_json({"graph": graph.name, "overrides": dict(graph.overrides), **first, **about})
     else:
@@ -279,9 +291,7 @@ FIRST_METRICS = 6
 run come first."""
 
 
-def print_result(
-    out: Console, name: str, result: RunResult, *, times: bool = True, verbose: bool = True
-) -> None:
+def print_result(out: Console, name: str, result: RunResult, *, verbose: bool) -> None:
     """Print the metrics and the times of a run; the first few metrics only, unless ``verbose``."""
     metrics = [(key, number(value)) for key, value in result.metrics.items()]
     if metrics:
@@ -295,7 +305,7 @@ def print_result(
         for path, t in result.blocks.items()
     ]
     columns = ("block", ">runs", ">median [us]", ">99 % [us]", ">longest [us]")
-    if times and verbose:
+    if verbose:
         out.print(table(f"{name}: time a run of each block takes", columns, rows))
     speed = result.duration_s / result.wall_time_s if result.wall_time_s else 0.0
     say(

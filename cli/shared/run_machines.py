@@ -38,7 +38,7 @@ from .output import (
     number,
     table,
 )
-from .run_graph import report_run
+from .run_graph import KeptRecording, report_run
 from .running_graphs import registered
 
 if TYPE_CHECKING:
@@ -105,8 +105,8 @@ def run_local(path: Path, options: RunOptions, out: Console) -> ExitCode:
                 problem = f"no whole recording: {target} cannot be written ({why})"
                 problem += f"; {remedy(cause_of(error), target)}"
     return report_run(
-        out, graph, result, as_json=options.as_json, traceback=options.traceback,
-        recording=recording, problem=problem, tables=_link_tables(part_reports),
+        out, graph, result, KeptRecording(recording, problem), as_json=options.as_json,
+        traceback=options.traceback, tables=_link_tables(part_reports),
         warnings=result.warnings, last={"machines": part_reports},
     )  # fmt: skip
 

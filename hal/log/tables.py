@@ -18,7 +18,7 @@ from .log_file import LogError, LogFile, bounded
 
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*")
 _LABEL = re.compile(r"\s*(\d+|[xyzw]|roll|pitch|yaw|.*[,_].*)\s*", re.IGNORECASE)
-"""What in brackets tells columns apart, and is no unit: a number, an axis, a name of parts."""
+"""Words in brackets that tell columns apart, and are no unit: a number, an axis, a name of parts."""
 _SPELLINGS = {
     "°": "deg", "°/s": "deg/s", "degree": "deg", "degrees": "deg", "degrees/s": "deg/s", "deg/sec": "deg/s", "sec": "s",
     "seconds": "s", "second": "s", "msec": "ms", "usec": "us", "nsec": "ns", "radians": "rad", "radian": "rad",

@@ -49,7 +49,7 @@ def step_calls(model: MjModel, data: MjData) -> tuple[ForeignCall, ForeignCall]:
 
 
 class JointResistance(NamedTuple):
-    """What may change in a model while it is simulated, of each degree of freedom."""
+    """The resistance of each degree of freedom, which may change while a model is simulated."""
 
     friction: Array
     damping: Array

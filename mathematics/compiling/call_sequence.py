@@ -85,7 +85,7 @@ class CallSequence:
 
     @property
     def native(self) -> bool:
-        """Whether the calls are made without the interpreter."""
+        """True if the calls are made without the interpreter."""
         return self._function is not None
 
     def prepare(self) -> None:

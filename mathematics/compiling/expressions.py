@@ -405,7 +405,7 @@ _ELEMENTS: Mapping[str, type] = {"float64": float, "int64": int, "bool": bool}
 FLAGS = ("isnan", "isfinite", "isinf")
 """NumPy's functions of a number that answer with a flag."""
 KEEPING = ("maximum", "minimum", "clip", "sign")
-"""Those that answer with a whole number for whole numbers."""
+"""NumPy's functions that answer with a whole number for whole numbers."""
 NUMBERS = "__aloft_numbers__"
 """Name in a kernel's module under which ``numpy_numbers`` stands for rewritten code."""
 

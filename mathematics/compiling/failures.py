@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class Failure(IntEnum):
-    """Why compiled code ends a run."""
+    """Reason for which compiled code ends a run."""
 
     DIVIDED_BY_ZERO = 0
     TOO_LARGE = 1

@@ -46,7 +46,7 @@ _ARITHMETIC: dict[str, Callable[[Any, Any, Any], Any]] = {
     "or": lambda to, a, b: _number(to, to.or_(_true(to, a), _true(to, b))),
     "if": lambda to, a, b: to.select(_true(to, a), b, _all_lanes(0.0)),
 }
-"""What each operation makes of one or two vectors. Truths are 1 and 0; ``if`` is b where a is not zero, else zero."""
+"""The result of each operation on one or two vectors. Truths are 1 and 0; ``if`` is b where a is not zero, else zero."""
 _LIBRARY = {
     "sin": 1, "cos": 1, "tan": 1, "asin": 1, "acos": 1, "atan": 1, "sinh": 1, "cosh": 1, "tanh": 1,
     "exp": 1, "log": 1, "floor": 1, "ceil": 1, "atan2": 2, "pow": 2, "fmin": 2, "fmax": 2,

@@ -45,7 +45,7 @@ class CodeInMemory(NamedTuple):
 
     memory: mmap.mmap
     address: int
-    """That of the symbol that was asked for."""
+    """The address of the symbol that was asked for."""
 
 
 class _Section(NamedTuple):

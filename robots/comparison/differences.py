@@ -1,4 +1,4 @@
-"""What two readings of a robot differ in: by how much at most, what is an error, and what differs on purpose."""
+"""Differences of two readings of a robot: by how much at most, which are errors, and which are on purpose."""
 
 from __future__ import annotations
 

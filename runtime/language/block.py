@@ -39,7 +39,7 @@ from .ports import Output as Output  # noqa: PLC0414
 from .ports import Port as Port  # noqa: PLC0414
 from .ports import State as State  # noqa: PLC0414
 from .runtime_block import BlockHooks
-from .unmet_requirement import UnmetRequirement as UnmetRequirement  # noqa: PLC0414
+from .runtime_block import UnmetRequirement as UnmetRequirement  # noqa: PLC0414
 
 STOP_CYCLES = 5
 """Rounds of ``stop_cycle``: more than one, since a bus may lose a packet."""

@@ -13,7 +13,7 @@ _holders: list[bool] = []
 _freezers: list[bool] = []
 """One entry for each that needs objects exempt from collections; the first says whether that was done here."""
 _frozen_elsewhere = False
-"""Whether objects were found that somebody else has frozen."""
+"""True once objects were found that somebody else has frozen."""
 
 
 @contextmanager
@@ -51,7 +51,7 @@ def objects_frozen() -> Iterator[None]:
 
 
 def _are_frozen() -> bool:
-    """Whether objects are frozen. Python finds out by a look at each of them, so those of others are
+    """Return whether objects are frozen. Python finds out by a look at each of them, so those of others are
     found once: half a million take as long as a short run."""
     global _frozen_elsewhere
     if not _freezers:

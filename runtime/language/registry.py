@@ -194,7 +194,7 @@ def _own_module(package: str, class_name: str) -> ModuleType | None:
 
 
 def _is_usable(found: object) -> bool:
-    """Whether a class is one of those that ``blocks_in_packages`` finds, as far as the class shows."""
+    """Return whether a class is one of those that ``blocks_in_packages`` finds, as far as the class shows."""
     return (
         isinstance(found, type)
         and issubclass(found, Block)

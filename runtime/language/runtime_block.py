@@ -8,6 +8,7 @@ empty or with a default: the tutorial tells when.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -23,7 +24,6 @@ from .ports import Input, Output, Port, PortOwner, State
 from .quantities import InputQuantities, OutputQuantities
 from .signals import Signal, StateElements
 from .steps import PythonCall, declare_steps
-from .unmet_requirement import UnmetRequirement
 
 
 class RuntimeBlock(PortOwner):
@@ -85,6 +85,23 @@ class RuntimeBlock(PortOwner):
             f"{cls.__name__} must define either step(), or emit() and update(); it defines "
             + (", ".join(n for n in ("step", "emit", "update") if hasattr(cls, n)) or "none")
         )
+
+
+@dataclass(frozen=True)
+class UnmetRequirement:
+    """Something about the graph's robot or a parameter that a block cannot work with.
+
+    ``message`` describes the problem. ``parameter`` is the parameter concerned, if any, as ``name``
+    or ``name.key``. ``nearest`` holds legal names that resemble the one found. ``fix`` is the text
+    to write instead.
+    """
+
+    message: str
+    parameter: str = ""
+    expected: str = ""
+    found: str = ""
+    nearest: tuple[str, ...] = ()
+    fix: str = ""
 
 
 class BlockHooks(RuntimeBlock):

@@ -29,12 +29,12 @@ from .command_watch import CommandWatch
 from .coordinator import (
     DistributedParameters,
     FaultReporter,
-    FreeRunningCoordinator,
     LockstepCoordinator,
     PartClock,
     PartLinks,
     StartBarrier,
 )
+from .free_coordinator import FreeRunningCoordinator
 from .free_link import TICK_TIME, LatestReceiver, LinkMonitor, TickTime, health_path
 from .lockstep_link import LinkInput, LinkOutput, LockstepReceiver, link_input_type
 from .message import MessageReader, MessageWriter

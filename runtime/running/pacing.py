@@ -43,7 +43,7 @@ class Pacer(Protocol):
     """Waits for ticks and counts those that began too late."""
 
     lateness: LatenessCounter
-    """How late ticks began; the late ones are the overruns."""
+    """The lateness of ticks; the late ones are the overruns."""
     skipped_periods: int
     """Periods that were left out to catch up."""
     in_a_row: int

@@ -52,7 +52,7 @@ class RunResult:
     """Ticks that began too late; see ``ClockSpec.late_after``."""
     skipped_periods: int = 0
     lateness: TickLateness | None = None
-    """How late ticks began; ``None`` for a run that goes as fast as it can."""
+    """The lateness of ticks; ``None`` for a run that goes as fast as it can."""
     error: RunError | None = None
     stop_problems: tuple[str, ...] = ()
     block_warnings: tuple[str, ...] = ()

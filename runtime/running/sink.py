@@ -1,4 +1,4 @@
-"""What keeps or watches a run: called once a tick and with each event, it may take one copy of the bus."""
+"""The interface of recorders and watchers of a run: called once a tick and with each event, it may take one copy of the bus."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ class Sink:
     """
 
     name: str = ""
-    """By which ``metrics`` are in the result, as those of a block are by its path."""
+    """The name of ``metrics`` in the result, where those of a block have its path."""
     waits_for_others: bool = False
-    """Whether ``record`` waits at present, with a limit of its own, which the watchdog respects."""
+    """True while ``record`` waits, with a limit of its own, which the watchdog respects."""
 
     def open(self, bound: BoundGraph) -> None:
         """Prepare, once, before the first tick."""

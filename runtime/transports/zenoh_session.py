@@ -31,7 +31,7 @@ ROOT = "aloft"
 
 @dataclass(frozen=True)
 class Limits:
-    """What a graph asks of its sessions.
+    """The requests of a graph to its sessions.
 
     Attributes:
         lease: the silence [s] after which others take a part for lost.
