@@ -49,7 +49,7 @@ CONTROLLER = "aloft.lab.studies.swing_up:Controller"
 SHARE, LIMIT, TOP = 0.2, 5.0, 8.0
 """The speeds' filter, the torque's limit [N m], and the time from which on the top is looked at [s]."""
 _GEARS = {"stiffness": 1000.0, "damping": 0.5}
-EFFECTS: dict[str, dict[str, Any]] = {
+_LOGGED: dict[str, dict[str, Any]] = {
     "no friction, no rotors": {"free": True},
     "friction and rotors": {},
     "latency 5 ms": {"latency": "5 ms"},
@@ -61,8 +61,8 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "latency 8 ms, static friction x 2": {"latency": "8 ms", "joints": {"static_friction": 2.0}},
     "latency 8 ms, friction of the elbow x 1.35": {"latency": "8 ms", "elbow": 1.35},
     "latency 2 ms, gears of 1000 N m/rad": {"latency": "2 ms", "gears": _GEARS},
-} | {
-    f"stiff: {name}": {"stiff": True, **effect} for name, effect in {
+}  # fmt: skip
+_STIFF: dict[str, dict[str, Any]] = {
         "friction and rotors": {},
         "latency 3 ms": {"latency": "3 ms"},
         "latency 4 ms": {"latency": "4 ms"},
@@ -74,8 +74,8 @@ EFFECTS: dict[str, dict[str, Any]] = {
         "latency 8 ms, static friction x 2": {"latency": "8 ms", "joints": {"static_friction": 2.0}},
         "latency 2 ms, gears of 1000 N m/rad": {"latency": "2 ms", "gears": _GEARS},
         "the same, play of 10 mrad": {"latency": "2 ms", "gears": {**_GEARS, "backlash": 0.01}},
-    }.items()
 }  # fmt: skip
+EFFECTS = _LOGGED | {f"stiff: {name}": {"stiff": True, **each} for name, each in _STIFF.items()}
 
 
 def moments() -> tuple[float, float]:
