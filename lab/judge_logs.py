@@ -250,7 +250,7 @@ class Expected:
             if keys[0].startswith("joints"):
                 speeds = self.tables["joints.velocity"]
                 moving = np.stack([np.interp(table.times, speeds.times, each) for each in speeds.values.T], 1)  # fmt: skip
-                same = same & moving.any(axis=1)
+                same = same & (np.abs(moving) > 1e-9).any(axis=1)
             share = max(share, float(same.mean()))
             good &= ~table_last(table, same, self.ticks) & ~self.in_gap(table)
         return good, share

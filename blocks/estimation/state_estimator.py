@@ -31,6 +31,7 @@ from .inertial_estimator import (
     forget,
     forget_samples,
     is_unaccelerated,
+    largest_of,
     learn_bias,
     limit,
     predict,
@@ -48,6 +49,8 @@ _GROUND_TIME = 1.0
 _SETTLING = 0.3
 """Time [s] in which the velocity settles after a start in a step: it is from one sample, whose error is not the tilt's. From
 then on the time constant of the tilt correction by velocity is the time since the start, as the tilt is hardly known."""
+_NOTICING = 0.1
+"""Time [s] after the start in which a robot that stands is seen at rest."""
 _UNREST_TIME = 0.3
 _FIRST_UNREST = 0.1
 _LARGEST_UNREST = 0.3
@@ -77,6 +80,9 @@ class GroundTrust(Signal):
         unit="rad",
         frame="world",
         text="turn that would lay each sole flat, low-passed",
+    )
+    waited = Field(
+        unit="s", text="time since the start without rest; infinite once the robot has rested"
     )
     age = Field(unit="s", text="time since the start in a step; infinite if the robot stood there")
 
@@ -165,7 +171,7 @@ class StateEstimator(InertialEstimator):
 
     It starts at the first sample, or in a gantry when the first point touches the ground, with the robot standing on level ground, or ground of that ``slope``; or in a step,
     if a rate is above 0.5 rad/s, also with all points in contact: then only the points in contact are on the ground, they give the first velocity, the tilt is
-    theirs, or the accelerometer's where they lie in one line, and the result has a warning. From then on each sole that stands keeps its tilt: what
+    theirs, beside their line the accelerometer's where they lie in one, and the result has a warning. From then on each sole that stands keeps its tilt: what
     seems to change in it corrects the tilt within 1 s, and moves the leg's points by the share ``flexion``, for a leg yields
     under its load and encoders do not see it. The world's
     origin is midway between the soles, and x is the heading of the feet; for feet of one contact point it is
@@ -206,10 +212,13 @@ class StateEstimator(InertialEstimator):
             trust.unrest = _FIRST_UNREST if trust.stepped else 0.0
             trust.gate = max(params.gate, params.unrest_factor * trust.unrest)
             trust.age = 0.0 if trust.stepped else math.inf
+            trust.waited = 0.0 if count_standing(legs.points.active) > 0 else math.inf
         elif fastest == math.inf:  # a foot that steps points elsewhere afterwards
             trust.facing = False
             trust.stepped = True
         trust.age += constants.period
+        if trust.waited < math.inf and estimate.stood:
+            watch_for_step(estimate, trust, params, constants, fastest)
         still = fastest < params.still_rate
         if not trust.flown:
             learn_accelerometer_bias(estimate, learning, constants, scratch, still)
@@ -243,6 +252,27 @@ class StateEstimator(InertialEstimator):
                 "second, and the gyroscope's bias is learnt only at rest"
             ),
         )
+
+
+@kernel
+def watch_for_step(
+    estimate: BaseEstimate,
+    trust: GroundTrust,
+    params: StateEstimatorParameters,
+    constants: InertialConstants,
+    fastest: float,
+) -> None:
+    """Notice that the start was in a step: the robot steps and has not been at rest, slow as it was at first."""
+    trust.waited += constants.period
+    if (
+        max(largest_of(estimate.mean_rate), largest_of(estimate.mean_joint_rate))
+        < params.still_rate
+    ):
+        trust.waited = math.inf
+    elif fastest == math.inf and trust.waited > _NOTICING:
+        estimate.stood = False
+        trust.unrest = _FIRST_UNREST
+        trust.age = 0.0
 
 
 @kernel
@@ -340,11 +370,11 @@ def use_soles(
     for foot in range(trust.lean.shape[0]):
         for point in range(standing.shape[0]):
             standing[point] = points.active[point] and owners[point] == foot
-        flat = misalignment(
+        if count_standing(standing) == 0:
+            continue
+        misalignment(
             estimate.orientation, motion.points, standing, motion.forward, constants.gradient, error, place
         )  # fmt: skip
-        if not flat:
-            continue
         lean = trust.lean[foot]
         lean[0] += passing * (error[0] - lean[0])
         lean[1] += passing * (error[1] - lean[1])

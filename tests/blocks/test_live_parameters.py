@@ -317,7 +317,6 @@ SCENES: Mapping[str, list[Scene]] = {
 
 
 IDLE = {
-    "blocks.StateEstimator": ["flexion"],
     "blocks.WholeBodyController": sorted(
         [
             *(f"{phase}.angular_by_size" for phase in ("landing", "stand", "thrust")),
@@ -332,7 +331,7 @@ IDLE = {
     ),
 }
 """One set of gains serves all phases: feet roll off and rise only in the thrust, and there none swings down. Weights are
-those of BRUCE, so its size changes none; and its soles are lines, whose tilt is not known."""
+those of BRUCE, so its size changes none."""
 
 
 def blocks_with_live_parameters() -> Iterator[str]:

@@ -141,6 +141,24 @@ def test_a_robot_that_moves_on_both_feet_does_not_stand_at_the_start():
     assert np.abs(bench.get("base").linear_velocity).max() > 0.01, "the legs give the velocity"
 
 
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("rests", [False, True])
+def test_a_slow_start_in_a_step_is_noticed_when_a_foot_leaves(rate, rests):
+    """A robot shifts its weight before a step, more slowly than sensors shake at rest."""
+    bench = BlockBench(StateEstimator, robot="bruce", rate=rate)
+    bench.set("joints", position=ROBOT.standing_position, velocity=0.3)
+    bench.set("imu", specific_force=[0.0, 0.0, GRAVITY])
+    bench.set("contacts", active=True)
+    bench.step()
+    bench.set("joints", velocity=0.0 if rests else 0.3)
+    bench.step(round(0.15 * rate))
+    assert not bench.block.warnings()
+    bench.set("contacts", active=FOOT == 0)
+    bench.step()
+    assert bool(bench.block.warnings()) == (not rests)
+    assert (bench.get("trust").age < 0.1) == (not rests)
+
+
 def test_feet_that_roll_open_the_gate_and_feet_that_stand_do_not():
     bench = standing(StateEstimator)
     bench.step(500)
