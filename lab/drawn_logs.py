@@ -181,6 +181,8 @@ class Drawing:
                 "position": self.chance.uniform(-0.1, 0.1, 3).round(3).tolist(),
                 "rpy": self.chance.uniform(-3.0, 3.0, 3).round(3).tolist(),
             }
+            if self.happens(0.3):
+                params["imu"]["link"] = self.one_of(*(joint.child for joint in self.robot.joints))
 
     def _quantity(
         self, drawn: DrawnLog, part: str, times: Numbers, unit: str, width: int

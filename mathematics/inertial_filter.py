@@ -127,7 +127,8 @@ def misalignment(
 
     A small rotation (a, b) about the world's x and y axes changes the height of a point at (x, y)
     relative to the points' mean by a y - b x; a and b are the least-squares solution over all
-    points that are active. Where they lie in one line the function returns False and the rotation is zero.
+    points that are active. Where they lie in one line the function returns False, and the rotation is the smallest that brings this line to the
+    ground; about the vertical, and of one point, it is zero.
 
     Args:
         active: the points to use, (n,).
@@ -156,6 +157,9 @@ def misalignment(
     determinant = xx * yy - xy * xy
     out[0] = out[1] = out[2] = 0.0
     if determinant <= 1e-4 * (xx + yy) * (xx + yy):
+        extent = max((xx + yy) * (xx + yy), 1e-12)
+        out[0] = -(yy * yz + xy * xz) / extent
+        out[1] = (xx * xz + xy * yz) / extent
         return False
     out[0] = (xy * xz - xx * yz) / determinant
     out[1] = (yy * xz - xy * yz) / determinant

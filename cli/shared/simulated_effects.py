@@ -27,7 +27,7 @@ ROBOT = "robot."
 """Prefix of the trials' keys for the simulated robot."""
 
 
-class Setting(NamedTuple):
+class TrialSetting(NamedTuple):
     """A setting of a trial, as it is written, and the comment behind it."""
 
     value: Any
@@ -54,7 +54,7 @@ def simulated_effects() -> list[dict[str, Any]]:
     return alone + rows
 
 
-def commented_settings(trial: str) -> dict[str, Setting]:
+def commented_settings(trial: str) -> dict[str, TrialSetting]:
     """Return a shipped trial's settings of the simulated robot, by the parameter's path below
     ``robot``."""
     file = shipped_folder() / "trials" / f"{trial}.yaml"
@@ -65,12 +65,12 @@ def commented_settings(trial: str) -> dict[str, Setting]:
     }
 
 
-def _read(file: Path) -> dict[str, Setting]:
+def _read(file: Path) -> dict[str, TrialSetting]:
     problems = Problems()
     node = read_file(file, file.name, problems)
     assert node is not None and not len(problems), f"{file} is a shipped trial"
     lines = file.read_text(encoding="utf-8").splitlines()
-    found: dict[str, Setting] = {}
+    found: dict[str, TrialSetting] = {}
     included = node.get("include")
     for name in plain(included.value) if included is not None else []:
         found |= _read(file.parent / name)
@@ -78,7 +78,7 @@ def _read(file: Path) -> dict[str, Setting]:
     if entry is not None and isinstance(entry.value, MapNode):
         for setting in entry.value:
             comment = lines[setting.key_where.line - 1].partition(" # ")[2].strip()
-            found[setting.key] = Setting(plain(setting.value), comment)
+            found[setting.key] = TrialSetting(plain(setting.value), comment)
     return found
 
 
@@ -94,7 +94,7 @@ def _groups(
 
 
 def _row(
-    group: str, name: str, info: FieldInfo, settings: dict[str, Setting], off: bool = False
+    group: str, name: str, info: FieldInfo, settings: dict[str, TrialSetting], off: bool = False
 ) -> dict[str, Any]:
     default = info.get_default(call_default_factory=True)
     required = info.is_required()

@@ -8,6 +8,7 @@ from __future__ import annotations
 from array import array
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -100,11 +101,11 @@ class _Topic:
             elif value.dtype.kind in "fiub":
                 yield path, value.ravel().astype(float).tolist()
         elif isinstance(value, list) and value and isinstance(value[0], str):
-            if self.texts.setdefault(path, value) != value and parent not in self.refused:
-                self.refused[parent] = (
-                    f"is not of the same parts all along: {path} changes from message to message, in row {len(self.stamps) - 1} first"
-                )
+            self._named(path, parent, value)
         elif isinstance(value, list) and value and _fields(value[0]) and len(value) <= MOST_WIDE:
+            for each in _fields(value[0]):
+                if isinstance(getattr(value[0], each), str):
+                    self._named(f"{path}.{each}", path, [getattr(part, each) for part in value])
             parts: dict[str, list[float]] = {}
             for part in value:
                 for inner, numbers in self._numbers(path, part):
@@ -113,11 +114,20 @@ class _Topic:
         elif _fields(value):
             yield from self._numbers(path, value)
 
+    def _named(self, path: str, parent: str, names: list[str]) -> None:
+        """Keep the names of a field's parts, which must be the same in every message."""
+        if self.texts.setdefault(path, names) != names and parent not in self.refused:
+            self.refused[parent] = (
+                f"is not of the same parts all along: {path} changes from message to message, in row {len(self.stamps) - 1} first"
+            )
+
     def put_into(self, log: LogFile) -> Indices1D:
         """Keep its columns, or why they are none, in a log; return its stamps [ns]."""
-        self.texts = {path: each for path, each in self.texts.items() if path not in self.refused}
-        log.texts.update(self.texts)
-        log.refused.update(dict.fromkeys(self.texts, "is text") | self.refused)
+        for path, names in self.texts.items():
+            self.refused.setdefault(path, "is text")
+            if path.rpartition(".")[0] not in self.refused:
+                log.texts[path] = names
+        log.refused.update(self.refused)
         if self.whole:
             log.refused[self.name] = self.whole
         rows = len(self.stamps)
@@ -128,16 +138,18 @@ class _Topic:
                 why = log.refused[parents[0]] if parents else "is not in every message"
                 log.refused[path] = "has one row" if rows < 2 else why
             else:
-                log.arrays[path] = LogArray(np.array(numbers, np.float64).reshape(rows, -1))
+                values = np.array(numbers, np.float64).reshape(rows, -1)
+                log.arrays[path] = LogArray(values, frame=next(iter(self.frames)))
         return stamps
 
 
 def _fields(message: Any) -> tuple[str, ...]:
-    return _fields_of(type(message))
+    kind: Any = type(message)
+    return _fields_of(kind)
 
 
 @cache
-def _fields_of(kind: type) -> tuple[str, ...]:
+def _fields_of(kind: Any) -> tuple[str, ...]:
     return tuple(
         each for each in getattr(kind, "__dataclass_fields__", ()) if each != "__msgtype__"
     )
@@ -167,7 +179,7 @@ def read_bag(path: Path) -> LogFile:
     first = min((int(own.min()) for own in stamps.values()), default=0)
     since = {id(own): 1e-9 * (own - first).astype(np.float64) for own in stamps.values()}
     for name, own in stamps.items():
-        log.arrays[name] = LogArray(log.arrays[name].values, since[id(own)])
+        log.arrays[name] = replace(log.arrays[name], stamps=since[id(own)])
     if not log.arrays and not log.refused:
         raise LogError(f"{path.name} has no messages")
     return log

@@ -96,7 +96,7 @@ def numbers(
         LogError: a column is missing, their number is another, they differ in length or clock, or a unit is none or of another dimension.
     """
     spec = columns if isinstance(columns, LogColumns) else LogColumns(columns=columns)
-    names = [spec.columns] if isinstance(spec.columns, str) else spec.columns
+    names = names_of(columns)
     if not names:
         raise LogError("no column is named")
     found = [log.array(name) for name in names]
@@ -135,6 +135,12 @@ def numbers(
     if any(spec.offset) or {*spec.scale, *factors} != {1.0}:
         values = (values - np.array(spec.offset)) * np.array(spec.scale) * np.array(factors)
     return values, own
+
+
+def names_of(columns: Columns) -> list[str]:
+    """Return the names of columns."""
+    names = columns.columns if isinstance(columns, LogColumns) else columns
+    return [names] if isinstance(names, str) else names
 
 
 def _other(own: Array1D | None, stamps: Array1D | None) -> bool:

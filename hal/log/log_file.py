@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
@@ -33,12 +33,14 @@ class LogError(ValueError):
 @dataclass(frozen=True)
 class LogArray:
     """One array of a log: ``values`` (n, k), and when its n rows were taken: ``stamps`` (n,) [s] since the file's first, none if the
-    file does not say. ``unit`` is what the file says, ``whole`` (n,) the same values where floats would round them."""
+    file does not say. ``unit`` and ``frame``, in which a sensor measures, are what the file says, ``whole`` (n,) the same values where
+    floats would round them."""
 
     values: Array
     stamps: Array1D | None = None
     unit: str | None = None
     whole: Indices1D | None = None
+    frame: str = ""
 
 
 @dataclass
@@ -72,7 +74,7 @@ class LogFile:
                 raise LogError(
                     f"{stem} has {whole.values.shape[1]} columns, so the last is {stem}[{whole.values.shape[1] - 1}]"
                 )
-            return LogArray(whole.values[:, k : k + 1], whole.stamps, whole.unit)
+            return replace(whole, values=whole.values[:, k : k + 1])
         known = [*self.arrays, *self.refused]
         near = get_close_matches(stem, known, 3, 0.5)
         raise LogError(
@@ -152,6 +154,8 @@ def read_log(path: Path) -> LogFile:
     Raises:
         LogError: it cannot be read, or is larger than the memory allowed for it.
     """
+    if not path.exists():
+        raise LogError(f"cannot read {path.name}: there is no such file")
     module, _, function = _reader(path).partition(":")
     try:
         reader = getattr(import_module(f".{module}", __package__), function)
@@ -175,6 +179,10 @@ def read_log(path: Path) -> LogFile:
 
 def _reader(path: Path) -> str:
     if path.is_dir():
+        if path.suffix == ".bag":
+            raise LogError(
+                f"{path.name} is a folder that is called like a file of ROS 1: rename it"
+            )
         return "bags:read_bag"
     ending = path.suffix.lower()
     if ending == ".db3" or path.name.endswith((".db3.zstd", ".mcap.zstd")):

@@ -53,8 +53,9 @@ class LogRobot(Robot):
 
     **Rows that are none**: what is no number, and a quaternion of zeros, is left out; of rows with one stamp the last counts.
     ``health.imu_valid``, ``joints_valid`` and ``contacts_valid`` are false in gaps of more than five usual steps and where the log
-    has no such columns; the first two also at samples that repeat the one before exactly, as a sensor that was not renewed does.
-    Metrics count gaps and repeats, and the result warns of what is likely wrong: units, signs, thresholds, rows left out.
+    has no such columns; the first two also at samples that repeat the one before exactly, as a sensor that was not renewed does,
+    the joints' only while they move. Metrics count gaps and repeats, and the result warns of what is likely wrong: units, signs,
+    thresholds, rows left out, speeds that are not those of the angles or of the truth.
 
     Commands are not heard: a log cannot be controlled. A run ends with the log.
 

@@ -40,6 +40,10 @@ NO_JOINT = "-"
 """In place of a column's name: it is no joint of the robot."""
 
 
+STILL = 1e-9
+"""Speeds of joints up to it are none: differences of angles are rounded [rad/s]."""
+
+
 class _Player:
     """Takes the columns of a log; every mistake is noted, and none ends it."""
 
@@ -185,7 +189,7 @@ def play(log: LogFile, params: LogParameters, robot: RobotDescription, period: f
         played.commanded = rows._replace(
             last=last_rows(commanded.stamps, player.times, hold=True), linear=np.array([False])
         ).at_ticks()
-    played.warnings = warnings_of(played, params, robot, player.taken)
+    played.warnings = warnings_of(log, played, params, robot, player.taken)
     return played
 
 
@@ -202,6 +206,13 @@ def _joints(player: _Player, names: Sequence[str]) -> tuple[list[int], tuple[Ser
             player.played.problems.append(LogProblem(problem, "joints.names"))
     elif given.names is not None:
         listed = given.names
+    else:
+        for key, texts in player.log.texts.items():
+            if texts != list(names) and sorted(texts) == sorted(names):
+                player.played.problems.append(
+                    LogProblem("the file has the joints in another order than the robot", "joints.names",
+                               "the order of the columns", "no names", key)
+                )  # fmt: skip
     if UNNAMED in listed:
         at = ", ".join(str(k) for k, name in enumerate(listed) if name == UNNAMED)
         player.played.problems.append(
@@ -412,7 +423,7 @@ def _validity(
 
     Args:
         samples: of one sensor. What has the stamp of another's new sample is one, too.
-        moving: speeds, without which a joint's sample may well be as before.
+        moving: speeds: what stands may well read as before.
     """
     repeats = [repeats_of(series.values) for series in samples]
     renewed = [series.stamps[~each] for series, each in zip(samples, repeats, strict=True)]
@@ -422,7 +433,8 @@ def _validity(
             repeated &= ~np.isin(series.stamps, stamps)
         if moving is not None:
             stamps = series.stamps[repeated]
-            repeated[repeated] = at_times(moving.stamps, moving.values, stamps).any(axis=1)
+            speeds = at_times(moving.stamps, moving.values, stamps)
+            repeated[repeated] = (np.abs(speeds) > STILL).any(axis=1)
         new, old = series.validity(player.times, repeated)
         valid, age, share = valid & new, np.maximum(age, old), max(share, float(repeated.mean()))
     return valid, age, share

@@ -6,8 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
-from .columns import MOST_JITTER, usual_step
+from .columns import MOST_JITTER, names_of, usual_step
+from .log_file import LogFile
 from .parameters import LogParameters
 from .played_rows import PlayedLog, PlayedRows
 from .series import GAP, Series
@@ -16,12 +18,22 @@ MANY_REPEATS = 0.02
 """A share of samples that repeat the one before, above which there is a warning."""
 GRAVITY = (7.0, 13.0)
 """Between these is the median of a specific force of a robot that is mostly on its feet [m/s^2]."""
+SHARE = (0.5, 2.0)
+"""Between these is the share of one measurement of a speed in another: filters and noise do less."""
+MOST_TILTED = 0.35
+"""A mean specific force is so far off the vertical at most, by the truth's turn [rad]."""
+TURNING, MOVING, WINDOW, LONGEST = 0.05, 0.015, 0.2, 100_000
+"""Speeds are compared where a base turns [rad/s], or a joint moves [rad or m], by windows of time [s], over so many rows."""
 BEYOND = 1.0
 """An angle may be so far beyond its limits [rad]: calibrations and models differ, but by less."""
 
 
 def warnings_of(
-    played: PlayedLog, params: LogParameters, robot: RobotDescription, taken: Sequence[Series]
+    log: LogFile,
+    played: PlayedLog,
+    params: LogParameters,
+    robot: RobotDescription,
+    taken: Sequence[Series],
 ) -> list[str]:
     """Return what in a log may mislead who uses it."""
     assert played.rows is not None
@@ -31,6 +43,9 @@ def warnings_of(
         *_of_joints(params, robot, played.rows),
         *_of_contacts(params, robot, played.rows),
         *_of_imu(params, played.rows),
+        *_of_speeds(params, robot, played.rows),
+        *_of_truth(params, played.rows),
+        *_of_mounting(log, params, robot),
     ]
 
 
@@ -96,6 +111,8 @@ def _of_joints(params: LogParameters, robot: RobotDescription, rows: PlayedRows)
 
 def _of_contacts(params: LogParameters, robot: RobotDescription, rows: PlayedRows) -> Iterator[str]:
     if not params.contacts:
+        if params.joints is not None and params.imu is not None and robot.feet:
+            yield "contacts are not given: the feet never touch"
         return
     untold = [foot.name for foot in robot.feet if foot.name not in params.contacts]
     if untold:
@@ -121,6 +138,82 @@ def _of_imu(params: LogParameters, rows: PlayedRows) -> Iterator[str]:
             "the specific force points down while the robot stands: scale: [-1.0] where the log has gravity in its place, or "
             "look at imu.rpy"
         )
+
+
+def _of_speeds(params: LogParameters, robot: RobotDescription, rows: PlayedRows) -> Iterator[str]:
+    if params.joints is None or params.joints.velocity is None:
+        return
+    angles, speeds = rows.position, rows.velocity
+    first, last = max(angles.stamps[0], speeds.stamps[0]), min(angles.stamps[-1], speeds.stamps[-1])
+    knots = np.arange(first, min(last, angles.stamps[:LONGEST][-1]), WINDOW)
+    for k, joint in enumerate(robot.joints):
+        if min(angles.column[k], speeds.column[k]) < 0 or len(knots) < 4:
+            continue
+        told = speeds.values[:, speeds.column[k]]
+        way = np.cumsum(0.5 * (told[1:] + told[:-1]) * np.diff(speeds.stamps))
+        told = np.diff(np.interp(knots, speeds.stamps, np.insert(way, 0, 0.0)))
+        moved = np.diff(np.interp(knots, angles.stamps, angles.values[:, angles.column[k]]))
+        if max(float(np.std(told)), float(np.std(moved))) < MOVING:
+            continue
+        share = _share(moved, told)
+        if not SHARE[0] < share < SHARE[1]:
+            yield (
+                f"{joint.name} moves {share:.2g} times as fast as its speeds say: look at unit, sign and order of "
+                "joints.position and joints.velocity"
+            )
+            return
+
+
+def _of_truth(params: LogParameters, rows: PlayedRows) -> Iterator[str]:
+    if params.truth is None or params.imu is None:
+        return
+    force = _in_world(rows.pose[:, 3:], rows.imu[:, 3:]).mean(axis=0)
+    off = float(np.arctan2(np.hypot(force[0], force[1]), force[2]))
+    if off > MOST_TILTED:
+        yield (
+            f"by the truth's turn the mean specific force is {off:.2g} rad off the vertical: look at unit "
+            "and order of truth, and at imu.sensor or imu.rpy"
+        )
+        return
+    times = rows.position.times
+    knots = np.searchsorted(times, np.arange(times[0], times[-1], WINDOW))
+    if len(knots) < 4:
+        return
+    counts = np.diff(knots)[:, None]
+    found, told = (
+        np.add.reduceat(each[: knots[-1]], knots[:-1]) / counts
+        for each in (rows.twist[:, 3:], rows.imu[:, :3])
+    )
+    moving = max(float(np.std(found)), float(np.std(told))) > TURNING
+    share = _share(found, told) if moving else 1.0
+    if not SHARE[0] < share < SHARE[1]:
+        yield (
+            f"the truth turns {share:.2g} times as fast as the gyroscope says: look at unit and sign of "
+            "imu.angular_velocity, and at the clocks"
+        )
+
+
+def _share(found: Array, told: Array) -> float:
+    """Return how much of what is told is found, by least squares."""
+    return float(np.sum(found * told) / max(np.sum(told**2), 1e-12))
+
+
+def _in_world(turn: Array, vectors: Array) -> Array:
+    """Return vectors (n, 3) turned by quaternions x, y, z, w (n, 4)."""
+    axis, w = turn[:, :3], turn[:, 3:]
+    across = 2.0 * np.cross(axis, vectors)
+    return vectors + w * across + np.cross(axis, across)
+
+
+def _of_mounting(log: LogFile, params: LogParameters, robot: RobotDescription) -> Iterator[str]:
+    imu = params.imu
+    if imu is None or imu.sensor or imu.link or any(imu.position) or any(imu.rpy):
+        return
+    frame = log.array(names_of(imu.angular_velocity)[0]).frame
+    links = [link.name for link in robot.links if link.name != robot.base]
+    if frame in robot.sensors.mounted or frame in links:
+        part = "sensor" if frame in robot.sensors.mounted else "link"
+        yield f"the IMU's messages are in the frame {frame}, and it is played at {robot.base}: imu.{part}: {frame}"
 
 
 def _some(names: Sequence[str]) -> str:

@@ -29,7 +29,7 @@ class UntrustedCodeError(AloftError):
 
 
 @dataclass(frozen=True)
-class Code:
+class NeededCode:
     """Some code: the ``block`` that needs it, its ``name`` in the graph, the ``place`` it would be run from, and
     the SHA-256 of its content; of a module with those beside it that it imports."""
 
@@ -76,41 +76,41 @@ def _type_of(block: FlatBlock) -> type[Block] | None:
         return None
 
 
-def code_of(graph: FlatGraph, robot: RobotDescription | None = None) -> list[Code]:
+def code_of(graph: FlatGraph, robot: RobotDescription | None = None) -> list[NeededCode]:
     """Return the code that a graph would run, each piece once; what is not there is left out.
 
     Args:
         graph: the flat graph, with the files that it would use.
         robot: its robot.
     """
-    found: dict[tuple[str, str], Code] = {}
+    found: dict[tuple[str, str], NeededCode] = {}
     for block in graph.blocks:
         folders = (block.folder, graph.folder, Path())
         for name in _classes(block, robot):
             file = find_source(name.partition(":")[0], folders)
             if file is not None and (name, digest := module_digest(file, name)) not in found:
-                found[name, digest] = Code(block.path, name, file, digest)
+                found[name, digest] = NeededCode(block.path, name, file, digest)
         for name in _programs(block):
             place = block.folder / name
             digest = program_digest(place)
             if digest:
-                found.setdefault((name, digest), Code(block.path, name, place, digest))
+                found.setdefault((name, digest), NeededCode(block.path, name, place, digest))
     return list(found.values())
 
 
-def is_trusted(code: Code) -> bool:
+def is_trusted(code: NeededCode) -> bool:
     """Return whether the user has run this code, or allowed it."""
     return TRUSTED.load(code.digest) is not None
 
 
-def remember(codes: Iterable[Code]) -> None:
+def remember(codes: Iterable[NeededCode]) -> None:
     """Trust this code from now on. A cache folder that cannot be written is no error: it is asked for again."""
     for code in codes:
         if not is_trusted(code):
             TRUSTED.save(code.digest, b"")
 
 
-def expect_trusted(codes: Sequence[Code], recording: Path) -> None:
+def expect_trusted(codes: Sequence[NeededCode], recording: Path) -> None:
     """Raise ``UntrustedCodeError`` with all code that the user has neither run nor allowed."""
     unknown = [code for code in codes if not is_trusted(code)]
     if unknown:

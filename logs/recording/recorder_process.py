@@ -34,7 +34,7 @@ from ..file.held_fields import split_bus
 from .output_file import OutputFile, cause_of, reserve_output, split_name
 from .recorder_protocol import KEYFRAME, NOTE, PART, REWIND, ROW, RecorderReport, RecorderTask
 from .rerun_import import import_rerun
-from .ring import Record, RingReader
+from .ring import RingReader, RingRecord
 from .writer import RecordingWriter
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ class RecorderProcess:
         full = self._filled >= period * self._header.base_rate
         return waited >= (period if full else SLOW_FLUSH * period)
 
-    def _take_one(self, record: Record) -> None:
+    def _take_one(self, record: RingRecord) -> None:
         if record.kind in (ROW, PART):
             self._take_row(record)
             self._ticks[self._filled] = self._last_tick = record.tick
@@ -197,7 +197,7 @@ class RecorderProcess:
             if self.feed is not None:
                 self.feed.note(note)
 
-    def _take_row(self, record: Record) -> None:
+    def _take_row(self, record: RingRecord) -> None:
         """Keep the base of a row, and of each held group its row where it is due, or begins a file."""
         data = np.frombuffer(record.data, np.uint8)
         whole, base = record.kind == ROW, self._bus.base

@@ -144,7 +144,7 @@ class RingWriter(_Ring):
 
 
 @dataclass(frozen=True)
-class Record:
+class RingRecord:
     """One record; ``data`` is a view of the ring that is valid until the next one is requested."""
 
     kind: int
@@ -159,7 +159,7 @@ class RingReader(_Ring):
         super().__init__(descriptor, capacity)
         self._tail = self._sequence = 0
 
-    def records(self) -> Iterator[Record]:
+    def records(self) -> Iterator[RingRecord]:
         """Yield all records there are now, each given back to the writer when the next is asked
         for."""
         head = self._counters[0]
@@ -176,7 +176,7 @@ class RingReader(_Ring):
                 return
             if kind != _SKIP:
                 data = self._bytes[place + _HEAD.size : place + _HEAD.size + size]
-                yield Record(kind, tick, data)
+                yield RingRecord(kind, tick, data)
                 data.release()
             self._sequence += 1
             self._tail += space

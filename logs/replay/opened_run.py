@@ -33,7 +33,7 @@ from ...runtime.language.stages import CheckedGraph
 from ...runtime.loading import checked_again, flattened_text
 from ...runtime.loading.flattening.change import change
 from ...runtime.running.memory import BoundGraph, Snapshot
-from ..file.code import Code, code_of, expect_trusted, remember
+from ..file.code import NeededCode, code_of, expect_trusted, remember
 from ..file.dependencies import digests, files_read, named_file, other_files, unpacked
 from ..file.format import Header
 from ..file.header import machine, versions
@@ -210,7 +210,7 @@ class OpenedRun:
             remember(codes)
         expect_trusted(codes if not self.trust else (), self.file.path)
 
-    def code(self, files: Sequence[str] = ()) -> list[Code]:
+    def code(self, files: Sequence[str] = ()) -> list[NeededCode]:
         """Return the code that is not aloft's which the recorded graph runs."""
         return code_of(change(self.flat, files, Problems()), self.file.header.robot)
 

@@ -30,7 +30,7 @@ from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.registry import block_name
 from ...runtime.language.stages import BlockSpec, CheckedGraph, ClockSpec
 from ...runtime.loading.checking.parameters import adjust
-from ...runtime.running.differences import Comparison, Difference, Translation
+from ...runtime.running.differences import Difference, RowComparison, Translation
 from ...runtime.running.executor import Executor
 from ...runtime.running.memory import BoundGraph, Snapshot
 from ...runtime.running.playback import Playback, PlaybackBlock, playback_graph
@@ -200,8 +200,8 @@ class Replayed:
 
     result: RunResult
     bound: BoundGraph
-    signals: Comparison
-    states: Comparison
+    signals: RowComparison
+    states: RowComparison
     first_tick: int
     ran: tuple[str, ...]
     notes: tuple[str, ...] = ()
@@ -387,8 +387,8 @@ class Follower(Sink):
         self.notes = [note for note in (*self._bus.notes, *states) if _block(note) in ran]
         whole = self._bus.identical and not self._feed.paths
         names = [name for name in self._bus.names if _block(name) in ran]
-        self.signals = Comparison(memory.bus.layout, order, None if whole else names)
-        self.states = Comparison(memory.state.layout, order, self._state.names, "state")
+        self.signals = RowComparison(memory.bus.layout, order, None if whole else names)
+        self.states = RowComparison(memory.state.layout, order, self._state.names, "state")
         self._rows = np.zeros((PIECE, memory.bus.layout.size), np.uint8)
         self._expected = np.zeros((PIECE, recorded.bus.size), np.uint8)
         self._ticks = np.zeros(PIECE, np.int64)

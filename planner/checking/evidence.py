@@ -17,10 +17,7 @@ from numpy.typing import NDArray
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import Motors, RobotDescription
-from ...robots.kinematics import (
-    LinkPoses,
-    ball_feet,
-)
+from ...robots.kinematics import LinkPoses
 from ...robots.welding import welded
 from ..models.euler_angles import euler_angles
 from ..models.exact_dynamics import dynamics_of
@@ -29,7 +26,7 @@ from ..models.robot_model import model_of, stances_of
 from ..models.symmetry import mirrored_pairs, symmetrised
 from ..task.phase import Phase
 from ..task.plan import PlannedJump
-from ..task.scaling import per_robot
+from ..task.scaling import ball_feet, per_robot
 from ..task.sequence import LEVEL, edge_of, ground_axes
 from ..task.task import JumpTask
 from .replay import Replay

@@ -206,10 +206,9 @@ def contacts(e: Evidence) -> Iterator[PlanTestResult]:
     standing = loaded & ~flying[:, None]
     slip = np.zeros(len(names))
     for place in range(len(plan.flights) + 1):
-        for number in range(len(names)):
-            places = e.resting[standing[:, number] & (e.place == place), number]
-            if len(places):
-                slip[number] = max(slip[number], float(np.ptp(places, axis=0).max()))
+        there = (standing & (e.place == place)[:, None])[:, :, None]
+        most, least = (np.where(there, e.resting, sign * np.inf) for sign in (-1.0, 1.0))
+        slip = np.maximum(slip, (most.max(axis=0) - least.min(axis=0)).max(axis=1))
     yield PlanTestResult("foot_slip", slip.max(), 3 * MILLIMETRE, "m", "how far a loaded point moves",
                 names[int(slip.argmax())])  # fmt: skip
     height = np.where(standing, np.abs(e.point_height), 0.0)

@@ -16,12 +16,12 @@ import numpy as np
 
 from ...mathematics.arrays import Indices
 from ...robots.description import Capsule, RobotDescription, Shape
-from ...robots.kinematics import ball_feet
 from ...robots.robot_description import Link
 from ...robots.shapes import Edge, corners_of, edges
 from ..models.coordinates import Coordinates
 from ..models.symbolic_model import SymbolicModel
 from ..task.read_task import edge_room
+from ..task.scaling import ball_feet
 from ..task.sequence import Hop, StanceLocation, step_of
 from .layout import ProblemPhase
 

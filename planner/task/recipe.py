@@ -33,10 +33,10 @@ import numpy as np
 from ...mathematics.constants import GRAVITY
 from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
-from ...robots.kinematics import ball_feet
 from ...runtime.language.parameters import Parameters
 from .margins import Margins
 from .scaling import (
+    ball_feet,
     knee_limits,
     least_distance_to_limits,
     rounded,

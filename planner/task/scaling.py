@@ -23,6 +23,7 @@ from ...mathematics.arrays import Array
 from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses, link_poses
+from ...robots.kinematics import ball_feet as feet_that_are_balls
 from ...robots.limb import chain_to
 from ...runtime.language.parameters import Parameters
 
@@ -68,6 +69,8 @@ def per_robot(function: _OfRobot[_Parameters, _Result]) -> _OfRobot[_Parameters,
     return called  # type: ignore[return-value]  # mypy types what wraps gives by itself
 
 
+ball_feet = per_robot(feet_that_are_balls)
+
 SAME_PLACE = 0.01
 """Contact points of a foot closer together than this [m], along it, are no heel and toe."""
 LEAST_CHANGE = 0.02
@@ -78,6 +81,7 @@ PART_OF_STANDING = 0.8
 """Share of the standing robot's bend in the legs that is required where it stands on nearly straight ones."""
 
 
+@per_robot
 def toe_name_token(robot: RobotDescription) -> str:
     """Return the word that the names of the front contact points of all feet have in common and those of no other
     points have, such as ``toe``; empty where feet are no soles, or have no such word.

@@ -101,7 +101,7 @@ class SignalErrorTiming(NamedTuple):
     event: bool
 
 
-class Comparison(NamedTuple):
+class EventCondition(NamedTuple):
     """The condition of an event: an element of a signal, a sign of ``SIGNS``, and a number."""
 
     sign: int
@@ -115,7 +115,7 @@ CONDITION = re.compile(r"\s*(?P<name>\S+?)\s*(?P<sign>==|!=|<=|>=|<|>)\s*(?P<val
 
 
 @kernel
-def notice_event(value: Array, condition: Comparison, happened: Flags) -> None:
+def notice_event(value: Array, condition: EventCondition, happened: Flags) -> None:
     """Set ``happened`` if the condition holds for a value of any type (1,), now or before."""
     number, wanted = float(value[0]), condition.number
     holds = (
@@ -260,7 +260,7 @@ class SignalError(Block):
     """Target of the fault, as written in the graph."""
     elements: ClassVar[dict[str, NDArray[np.int64]]] = {}
     """The places that it changes, by field."""
-    compared: ClassVar[Comparison | None] = None
+    compared: ClassVar[EventCondition | None] = None
     """The event after which it begins, if there is one."""
 
     state = Output(SignalErrorState, text="whether it is there")
@@ -391,7 +391,7 @@ def signal_error_type(
     elements: dict[str, NDArray[np.int64]],
     params: SignalErrorParameters,
     delay: int,
-    compared: Comparison | None = None,
+    compared: EventCondition | None = None,
     event: type[Signal] | None = None,
     *,
     reads_truth: bool = False,

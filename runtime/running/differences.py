@@ -73,7 +73,7 @@ class FieldDifference:
 
 
 @dataclass
-class Comparison:
+class RowComparison:
     """Compares recorded and replayed rows of the bus, or of the state.
 
     Attributes:

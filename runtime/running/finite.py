@@ -1,20 +1,24 @@
 """Checks once a tick that every float of the bus is finite that may have changed in it.
 
-The usual check is one cheap product; only if it fails is the element searched.
+The usual check is a kernel in a chain, or one cheap product; only if it fails is the element searched.
 """
 
 from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from math import isfinite
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ...mathematics.arrays import Array, Indices
+from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.kernel import kernel
 from ..language.errors import AloftError
 from ..language.layout import Layout
-from .memory import Region
 
 _PIECE = 8192
 """Elements in one product: fewer than make a BLAS library start threads."""
@@ -30,6 +34,13 @@ warnings.filterwarnings(  # the check finds it itself; setting NumPy's state in 
 )
 
 
+class Region(Protocol):
+    """A region of memory, as ``memory`` has it."""
+
+    layout: Layout
+    sections: Mapping[str, NDArray[Any]]
+
+
 class NotFiniteError(AloftError):
     """A signal holds NaN or infinity, ``value``, at ``place``."""
 
@@ -39,11 +50,27 @@ class NotFiniteError(AloftError):
         self.value = value
 
 
+@kernel
+def find_not_finite(values: Array, found: Indices) -> None:
+    """Set ``found`` to one where a value is not finite."""
+    wrong = 0
+    for k in range(
+        values.size
+    ):  # the difference is not zero, but no number; no sum, which could overflow
+        wrong |= int(values[k] - values[k] != 0.0)
+    if wrong:
+        found[0] = 1
+
+
 class FiniteCheck:
     """Checks that every float of a region is finite.
 
     The scalar product of the region with a vector of tiny numbers is finite exactly if all elements
     are, and takes one call. (A vector of zeros would do, but NumPy warns of zero times infinity.)
+
+    Attributes:
+        calls: look for such a value in a chain of compiled kernels, in place of ``check``.
+        found: (1,), not zero where they have found one; ``check`` says which.
     """
 
     def __init__(self, region: Region, unchanged: Collection[str] = ()) -> None:
@@ -55,16 +82,27 @@ class FiniteCheck:
         self._region = region
         floats = region.sections["float64"]
         tiny = np.full(min(_PIECE, floats.size), _TINY)
+        ranges = list(_ranges(region.layout, frozenset(unchanged)))
         self._pieces = [
             (floats[i : min(i + _PIECE, stop)], tiny[: min(_PIECE, stop - i)])
-            for start, stop in _ranges(region.layout, frozenset(unchanged))
+            for start, stop in ranges
             for i in range(start, stop, _PIECE)
         ]
+        self.found = np.zeros(1, np.int64)
+        self.calls = tuple(
+            KernelCall(find_not_finite, floats[start:stop], self.found) for start, stop in ranges
+        )
         self._product = np.zeros(())
         self._value = self._product.reshape(1).data  # reading through this allocates no array
 
+    @property
+    def compiled(self) -> bool:
+        """Whether a chain can make the ``calls``."""
+        return bool(self.calls) and all(call.compiled is not None for call in self.calls)
+
     def check(self) -> None:
         """Raise ``NotFiniteError`` for the first element that is not finite."""
+        self.found[0] = 0
         for floats, tiny in self._pieces:
             np.dot(floats, tiny, self._product)
             if not isfinite(self._value[0]):

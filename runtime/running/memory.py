@@ -23,6 +23,7 @@ from ..language.signals import DTYPES, Signal
 from ..language.stages import BlockSpec, CheckedGraph
 from ..language.steps import bind_steps
 from .failures import blame
+from .finite import FiniteCheck
 from .kernel_checks import check_kernels
 from .live_parameters import LiveParameters
 from .snapshot import Snapshot as Snapshot  # noqa: PLC0414  also imported from here
@@ -209,8 +210,9 @@ class BoundGraph:
         with collect_calls() as calls:
             for spec in graph.blocks:
                 self.blocks[spec.path] = self._set_up(spec)
+            self.finite_check = FiniteCheck(self.memory.bus)
         self.kernel_calls: Sequence[KernelCall] = tuple(calls)
-        """The calls of kernels that the blocks made in ``setup``."""
+        """The calls of kernels that the blocks made in ``setup``, and those of the finite check."""
         self.parameters = LiveParameters(self.blocks)
         check_kernels(graph, self.blocks)
 

@@ -17,6 +17,7 @@ from typing import Any, Protocol
 
 from ...mathematics.compiling.call_sequence import CallSequence, Owner
 from ...mathematics.compiling.chain_code import clock_address
+from ...mathematics.compiling.compile_calls import compile_calls
 from ..language.block import Block
 from ..language.errors import RunError
 from ..language.schedule import phases
@@ -84,7 +85,9 @@ class Ticker:
         self._now = time_source.now
         self._timing = timing
         self._fused = False
-        self._finite_check = finite_check
+        self._checks: dict[frozenset[str], FiniteCheck] | None = None
+        if finite_check:
+            self._checks = {frozenset(): bound.finite_check}
         self.programs, self._table = self._make_programs()
         self._previous: Program | None = None
         self.sinks: Sequence[Sink] = ()
@@ -116,35 +119,45 @@ class Ticker:
         own_clock = self._now is time.perf_counter_ns and clock_address() != 0
         self._fused = (own_clock or not self._timing) and any(map(can_be_chained, blocks))
         if self._fused:
+            checks = (self._checks or {}).values()
+            compile_calls([call for check in checks for call in check.calls])
             self.programs, self._table = self._make_programs()
         return self._fused
 
     def _make_program(self, outputs: Sequence[TickCall], updates: Sequence[TickCall]) -> Program:
-        made = self._in_chains(outputs)
-        if self._finite_check:
-            unchanged = self.bound.blocks.keys() - {call.path for call in outputs}
-            made.append(("", FiniteCheck(self.bound.memory.bus, unchanged).check))
-        made += self._in_chains(updates)
+        checks = list[FiniteCheck]()
+        if self._checks is not None:
+            unchanged = frozenset(self.bound.blocks.keys() - {call.path for call in outputs})
+            if unchanged not in self._checks:
+                self._checks[unchanged] = FiniteCheck(self.bound.memory.bus, unchanged)
+            checks = [self._checks[unchanged]]
+        made = self._in_chains([*outputs, *checks, *updates])
         owners, calls = [owner for owner, _ in made], [call for _, call in made]
         sampled = self.pacer is None and any(isinstance(owner, CallSequence) for owner in owners)
         return Program(calls, owners, self._now if self._timing else None, sampled=sampled)
 
     def _in_chains(
-        self, calls: Sequence[TickCall]
+        self, calls: Sequence[TickCall | FiniteCheck]
     ) -> list[tuple[str | CallSequence, Callable[[], Any]]]:
         """Pair the calls with their owners; kernels that follow each other are one call of a chain."""
-        blocks, numbers = self.bound.blocks, {p: k for k, p in enumerate(self.bound.graph.order)}
+        numbers = {path: k for k, path in enumerate(self.bound.graph.order)}
         found: list[tuple[str | CallSequence, Callable[[], Any]]] = []
-        pieces = groupby(
-            calls, lambda call: self._fused and can_be_chained(blocks[call.path], call.calls)
-        )
-        for chained, group in pieces:
-            piece = list(group)
+
+        def entry(call: TickCall | FiniteCheck) -> tuple[bool, Owner, Callable[[], Any]]:
+            if isinstance(call, FiniteCheck):
+                owner = Owner(call, "", -1, lambda: call.calls, call.found, call.check)
+                return self._fused and call.compiled, owner, call.check
+            block = self.bound.blocks[call.path]
+            chained = self._fused and can_be_chained(block, call.calls)
+            return chained, _owner(block, numbers[call.path], call), getattr(block, call.method)
+
+        for chained, group in groupby(map(entry, calls), lambda made: made[0]):
             if not chained:
-                found += [(call.path, getattr(blocks[call.path], call.method)) for call in piece]
+                found += [(owner.name, method) for _, owner, method in group]
                 continue
-            owners = [_owner(blocks[call.path], numbers[call.path], call) for call in piece]
-            chain = CallSequence(owners=owners, running=self.bound.running)
+            chain = CallSequence(
+                owners=[owner for _, owner, _ in group], running=self.bound.running
+            )
             _prepare(chain)
             found.append((chain, chain.run))
         return found

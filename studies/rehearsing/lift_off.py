@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -167,8 +167,7 @@ def rehearse(
         AloftError: a run could not be made.
     """
     measure = in_all_worlds(path, overrides, parameters, TRIAL, seeds, run_once, "the plan")
-    learnt = learn(measure, momentum_unit, tries=tries, seeds=seeds, on_try=on_try)
-    return replace(learnt, trial=TRIAL)
+    return learn(measure, momentum_unit, tries=tries, seeds=seeds, on_try=on_try)
 
 
 def in_all_worlds(

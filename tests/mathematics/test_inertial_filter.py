@@ -120,20 +120,38 @@ def test_misalignment_is_first_order_exact():
     assert error == pytest.approx([-1e-3, 2e-3, -3e-3], abs=1e-5)
 
 
-def test_points_in_one_line_say_nothing():
-    points = np.array([[0.05, 0.0, -0.4], [0.0, 0.0, -0.4], [-0.03, 0.0, -0.4]])
-    error = np.ones(3)
-    forward = np.array([1.0, 0, 0])
+@given(small, small, st.floats(-3.0, 3.0))
+def test_points_in_one_line_give_the_turn_across_it(x, y, heading):
+    """The smallest turn that lays the line flat: about the line itself it leaves what is there."""
+    along = np.array([math.cos(heading), math.sin(heading), 0.0])
+    points = np.outer([0.05, 0.0, -0.03], along) - np.array([0.0, 0.0, 0.4])
+    q, error, forward = quaternion_of((0.0, 0.0, 0.0)), np.empty(3), np.array([1.0, 0, 0])
+    inertial.rotate_in_world(q, x, y, 0.0)
+    everything = points, np.ones(3, bool), forward, np.zeros(2), error, np.empty(3)
+    for _ in range(10):
+        assert not inertial.misalignment(q, *everything)
+        assert error[2] == 0.0
+        assert abs(error @ along) < 0.1 * np.abs(error).max() + 1e-9
+        inertial.rotate_in_world(q, *error.tolist())
+    middle, end = np.empty(3), np.empty(3)
+    rotations.rotate(q, points[1], middle)
+    rotations.rotate(q, points[0], end)
+    assert end[2] == pytest.approx(middle[2], abs=1e-9)
+
+
+def test_one_point_says_nothing():
+    error, forward = np.ones(3), np.array([1.0, 0, 0])
+    point = np.array([[0.05, 0.0, -0.4]])
     assert not inertial.misalignment(
         quaternion_of((0.1, 0, 0)),
-        points,
-        np.ones(3, bool),
+        point,
+        np.ones(1, bool),
         forward,
         np.zeros(2),
         error,
         np.empty(3),
     )
-    assert not error.any()
+    assert error == pytest.approx(np.zeros(3), abs=1e-12)
 
 
 def test_weights_fall_with_speed_and_are_zero_without_contact():

@@ -118,8 +118,8 @@ class HopPlanner:
             found = self._corrector(problem).correct(problem, guess)
             steps += found.steps
             if found.solved:
-                plan = PlannedJump(task=task, **unpack(problem, found.values))
-                plan = replace(plan, statistics={"coordinates": problem.coordinates.name})
+                solved = {"coordinates": problem.coordinates.name}
+                plan = PlannedJump(task=task, statistics=solved, **unpack(problem, found.values))
                 break
         return plan, steps, time.process_time() - started
 

@@ -11,6 +11,7 @@ import io
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -70,10 +71,13 @@ class PlanSamples:
         """Return the plan whose request is the nearest, of those within reach."""
         apart = differences(self.requests, wanted)
         square = (apart * apart).sum(axis=1)
-        for row, request in enumerate(self.requests.tolist()):
-            if self.reach.nearest(HopRequest(*request)) != HopRequest(*request):
-                square[row] = np.inf
-        return int(square.argmin())
+        return int(np.where(self._within, square, np.inf).argmin())
+
+    @cached_property
+    def _within(self) -> NDArray[np.bool_]:
+        """Whether each request is within reach."""
+        requests = [HopRequest(*each) for each in self.requests.tolist()]
+        return np.array([self.reach.nearest(each) == each for each in requests])
 
     def plan(self, row: int) -> PlannedJump:
         """Return one of the plans. Its flight begins and ends at knots, whose times are in single precision."""

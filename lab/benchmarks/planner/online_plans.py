@@ -3,10 +3,13 @@ checked table.
 
 The requests are drawn uniformly within reach by a seed: straight ones ahead and back, those in all directions with
 turns, and those up and down. Solving, the check and the table of the reference count; all of it is one thread. The first
-plans of each kind, which load and compile, do not.
+plans of each kind, which load and compile, do not. A digest of all plans and tables tells whether two builds plan the
+same bits.
 """
 
 from __future__ import annotations
+
+import hashlib
 
 import numpy as np
 
@@ -21,6 +24,7 @@ from ....extensions.hopping.planner.next_hop import HopPlanner
 from ....extensions.hopping.planner.plan_outcome import PlanOutcome
 from ....planner.library.jump_table import table_rows
 from ....planner.solving.solver_process import cpu_time
+from ....planner.task.plan import ARRAYS
 from ....robots.description import find_robot
 from ..rows import Row
 
@@ -60,12 +64,18 @@ def online_plans(count: int = COUNT) -> list[Row]:
     rows = []
     for kind, goals in GOALS.items():
         times, followed = [], dict.fromkeys(PlanOutcome, 0)
+        bits = hashlib.blake2b(digest_size=8)
         for wanted in requests(kind, count):
             start = cpu_time()
             found = planner.plan(wanted)
             planned = cpu_time()
-            table_rows(hop_table(found.plan, robot))
+            table = hop_table(found.plan, robot)
+            table_rows(table)
             end = cpu_time()
+            for name in ARRAYS:
+                bits.update(getattr(found.plan, name).tobytes())
+            for column in table.columns.values():
+                bits.update(column.tobytes())
             times.append((end - start, found.solve_s, found.check_s, end - planned))
             followed[found.outcome] += 1
         whole, *parts = np.median(times, axis=0)
@@ -74,6 +84,7 @@ def online_plans(count: int = COUNT) -> list[Row]:
             *(x for name, part in zip(("problem and steps", "check", "table"), parts, strict=True)
               for x in (name, 1e3 * part))
         ) + ", ".join(f"{n} {outcome.name.lower()}" for outcome, n in followed.items() if n)  # fmt: skip
+        note += f"; digest {bits.hexdigest()}"
         rows.append(
             Row(f"plan in the loop, {kind}, median", float(whole), "s", goal=goals[0], note=note)
         )

@@ -86,7 +86,7 @@ def test_every_case_is_measured_in_turns(tmp_path: Path, monkeypatch: pytest.Mon
         return {"time": 2.0 if earlier else 1.0}
 
     monkeypatch.setattr(module, "run_process", process)
-    monkeypatch.setattr(module, "mujoco_alone", lambda: Row("ticks", 1.0, "s"))
+    monkeypatch.setattr(module, "mujoco_alone", lambda: [Row("ticks", 1.0, "s")])
     monkeypatch.setattr(
         module, "CASES", (Case("a", {"one": "time"}), Case("b", {"two": "time"}, long=True))
     )

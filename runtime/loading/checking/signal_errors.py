@@ -25,7 +25,7 @@ from ...language.signal_error import (
     HOLDING,
     OPTIONS,
     SIGNS,
-    Comparison,
+    EventCondition,
     SignalError,
     SignalErrorParameters,
     chirp_lines,
@@ -378,7 +378,7 @@ class _SignalErrorReader:
             "", where, delay=1, slices=(WireSlice("", where, (element,)),), truth=output.truth
         )
         signal = selected_signal("Event", {field_name: ((), field.dtype_name)})
-        return Comparison(SIGNS.index(match["sign"]), number), signal, wire, output.truth
+        return EventCondition(SIGNS.index(match["sign"]), number), signal, wire, output.truth
 
     def _report(self, message: str, where: Position, code: Code = Code.BAD_VALUE, **details: Any) -> None:  # fmt: skip
         self.problems.add(code, message, where, at=self.at, **details)

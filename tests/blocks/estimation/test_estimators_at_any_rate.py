@@ -141,6 +141,24 @@ def test_a_robot_that_moves_on_both_feet_does_not_stand_at_the_start():
     assert np.abs(bench.get("base").linear_velocity).max() > 0.01, "the legs give the velocity"
 
 
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("rests", [False, True])
+def test_a_slow_start_in_a_step_is_noticed_when_a_foot_leaves(rate, rests):
+    """A robot shifts its weight before a step, more slowly than sensors shake at rest."""
+    bench = BlockBench(StateEstimator, robot="bruce", rate=rate)
+    bench.set("joints", position=ROBOT.standing_position, velocity=0.3)
+    bench.set("imu", specific_force=[0.0, 0.0, GRAVITY])
+    bench.set("contacts", active=True)
+    bench.step()
+    bench.set("joints", velocity=0.0 if rests else 0.3)
+    bench.step(round(0.15 * rate))
+    assert not bench.block.warnings()
+    bench.set("contacts", active=FOOT == 0)
+    bench.step()
+    assert bool(bench.block.warnings()) == (not rests)
+    assert (bench.get("trust").age < 0.1) == (not rests)
+
+
 def test_feet_that_roll_open_the_gate_and_feet_that_stand_do_not():
     bench = standing(StateEstimator)
     bench.step(500)
@@ -148,3 +166,61 @@ def test_feet_that_roll_open_the_gate_and_feet_that_stand_do_not():
     bench.set("joints", velocity=[0.2 * (-1) ** k for k in range(len(ROBOT.joints))])
     bench.step(500)
     assert bench.get("trust").gate > 0.1
+
+
+FLAT = find_robot("g1")
+"""A robot whose soles have four points."""
+HIP, ANKLE = (
+    next(k for k, joint in enumerate(FLAT.joints) if f"right_{name}_pitch" in joint.name)
+    for name in ("hip", "ankle")
+)
+
+
+def shift_when_a_joint_yields(joint, angle, begin_speed=1.0, **params):
+    """Distance [m] by which a base at rest seems to move while a joint of its stance leg yields in 0.4 s."""
+    bench = BlockBench(StateEstimator, params, robot="g1", rate=500.0)
+    still = np.zeros(len(FLAT.joints))
+    position, speed = np.array(FLAT.standing_position), still.copy()
+    speed[0] = begin_speed
+    right = np.array([FLAT.feet[foot].name == "right" for foot in FLAT.foot_of_contact()])
+    bench.set("joints", position=position, velocity=speed)
+    bench.set("imu", specific_force=[0.0, 0.0, GRAVITY])
+    bench.set("contacts", active=right)
+    bench.step()
+    bench.set("joints", velocity=still)
+    bench.step(250)
+    before = np.array(bench.get("base").position)
+    for tick in range(1, 201):
+        phase = math.pi * tick / 400
+        position[joint] = FLAT.standing_position[joint] + angle * math.sin(phase)
+        speed = still.copy()
+        speed[joint] = angle * math.pi / 0.8 * math.cos(phase)
+        bench.set("joints", position=position, velocity=speed)
+        bench.step()
+    return float(np.linalg.norm(np.array(bench.get("base").position) - before))
+
+
+def test_a_hip_that_yields_moves_a_base_that_began_in_a_step_by_less():
+    """The sole seems to tilt by what no motor did, and the base to move by this times the leg's length."""
+    rigid = shift_when_a_joint_yields(HIP, 0.02, flexion=0.0)
+    assert rigid > 0.01
+    assert shift_when_a_joint_yields(HIP, 0.02) < 0.65 * rigid
+    assert shift_when_a_joint_yields(HIP, 0.02, flexion=1.0) < 0.45 * rigid
+
+
+def test_an_ankle_that_yields_costs_less_than_a_hip_did():
+    """Which joint has yielded is not known, so the share is a compromise."""
+    rigid = shift_when_a_joint_yields(HIP, 0.02, flexion=0.0)
+    assert shift_when_a_joint_yields(ANKLE, 0.02) < 0.7 * rigid
+
+
+def test_a_sole_that_tilts_far_rolls_and_its_leg_has_not_yielded():
+    far = shift_when_a_joint_yields(ANKLE, 0.5, flexion=0.0)
+    assert shift_when_a_joint_yields(ANKLE, 0.5) == pytest.approx(far, abs=0.01)
+
+
+def test_a_robot_that_stood_at_the_start_keeps_its_bits():
+    stood = {"begin_speed": 0.0}
+    assert shift_when_a_joint_yields(HIP, 0.02, flexion=1.0, **stood) == (
+        shift_when_a_joint_yields(HIP, 0.02, flexion=0.0, **stood)
+    )

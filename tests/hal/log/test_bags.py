@@ -7,6 +7,8 @@ import pytest
 
 import aloft
 from aloft.hal.log.log_file import LogError, read_log
+from aloft.hal.log.parameters import LogParameters
+from aloft.hal.log.played_log import play
 from aloft.robots.description import find_robot
 
 from ...cli.conftest import run_here
@@ -21,7 +23,7 @@ COUNT, PERIOD, LATE = 200, 0.005, 0.02
 """Messages arrive so late at most that their arrival is another clock than their headers'."""
 
 
-def write_bag(folder, plugin, *, swap=False):
+def write_bag(folder, plugin, *, swap=False, frame="base"):
     """Write a bag with an IMU at rest and joints that turn by 0.1 rad/s times their number."""
     types = STORE.types
     time_type, header_type = types["builtin_interfaces/msg/Time"], types["std_msgs/msg/Header"]
@@ -35,7 +37,7 @@ def write_bag(folder, plugin, *, swap=False):
         for k in range(COUNT):
             time = PERIOD * k
             stamp = time_type(sec=10 + int(time), nanosec=round(1e9 * (time % 1.0)))
-            header = header_type(stamp=stamp, frame_id="base")
+            header = header_type(stamp=stamp, frame_id=frame)
             arrival = round(1e9 * (10.0 + time + LATE / 8 * (k % 2)))
             message = types["sensor_msgs/msg/Imu"](
                 header, four(0.0, 0.0, 0.0, 1.0), nothing, vector(0.01 * k, 0.0, 0.0), nothing,
@@ -86,6 +88,19 @@ def test_a_bag_plays_the_robot(bag):
     time = 0.01 * np.arange(len(places))
     assert places == pytest.approx(0.1 * time[:, None] * np.arange(len(JOINTS)), abs=1e-9)
     assert result.metrics["log_jitter"] < 1e-3
+
+
+def test_a_bag_says_in_which_frame_its_imu_measures(tmp_path):
+    folder = write_bag(tmp_path / "bag", StoragePlugin.MCAP, frame="left_calf")
+    given = {"file": "bag", "imu": {"angular_velocity": "imu_data.angular_velocity",
+                                    "specific_force": "imu_data.linear_acceleration"}}  # fmt: skip
+    robot = find_robot("bruce")
+    played = play(read_log(folder), LogParameters.model_validate(given), robot, 0.01)
+    warning = "the IMU's messages are in the frame left_calf, and it is played at torso: imu.link: left_calf"
+    assert warning in played.warnings
+    given["imu"]["link"] = "left_calf"
+    played = play(read_log(folder), LogParameters.model_validate(given), robot, 0.01)
+    assert warning not in played.warnings
 
 
 def test_joints_that_change_their_order_are_refused(tmp_path):

@@ -295,18 +295,24 @@ def test_the_default_estimator_follows_a_real_robot_at_any_rate(tmp_path, rate, 
 
 @needs_icub
 @pytest.mark.long
-@pytest.mark.parametrize("begin", [6.1, 6.9, 7.6, 8.0, 9.7])  # 7.6, 9.7: on both feet, moving
-def test_a_log_may_begin_in_a_step_of_a_real_robot(tmp_path, begin):
+@pytest.mark.parametrize(
+    ("begin", "rate"),
+    # 7.6, 9.7: on both feet, moving; in 8.2, 8.8 and 9.85 a leg that yields cost most
+    [(6.1, 100), (6.9, 100), (7.6, 100), (8.2, 100), (8.8, 250), (9.7, 100), (9.85, 500)],
+)
+def test_a_log_may_begin_in_a_step_of_a_real_robot(tmp_path, begin, rate):
     pytest.importorskip("h5py")
     robot = icub_estimators.write_robot(tmp_path)
-    errors = {
-        kind: icub_estimators.metrics_of(robot, "walking.mat", 100, kind, begin)[
+    kinds = "StateEstimator", "InvariantKalmanFilter"
+    default, invariant = (
+        icub_estimators.metrics_of(robot, "walking.mat", rate, kind, begin)[
             "estimator_position_rms_m"
         ]
-        for kind in ("StateEstimator", "InvariantKalmanFilter")
-    }
-    assert errors["StateEstimator"] < 0.03
-    assert errors["InvariantKalmanFilter"] < 0.05, "649 and 61 mm from 6.1 s before"
+        for kind in kinds
+    )
+    assert default < 0.02, "649 mm from 6.1 s before"
+    assert default <= 1.2 * invariant
+    assert invariant < 0.05
 
 
 def test_a_graph_is_written_from_a_file(saved):

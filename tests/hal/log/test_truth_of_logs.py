@@ -120,6 +120,11 @@ def test_what_the_log_does_not_have_is_not_valid():
     assert not played(log_of()).rows.contacts_valid.any()
 
 
+def test_a_walk_without_contacts_is_warned_of():
+    q = {"joints": {"names": ["left_knee"], "position": "q"}}
+    assert "contacts are not given: the feet never touch" in played(log_of(q=TIMES), **q).warnings
+
+
 def test_quaternions_in_either_order_and_those_that_are_none():
     truth = {"position": "force", "quaternion": "four"}
     lost = FOUR.copy()
@@ -205,6 +210,52 @@ def test_a_slide_is_in_metres():
 def test_what_is_likely_wrong_is_warned_of(changed, given, warning):
     assert not [each for each in played(log_of()).warnings if "median" in each]
     assert any(warning in each for each in played(log_of(**changed), **given).warnings)
+
+
+SWING = {"q": 0.5 * np.sin(9 * TIMES), "v": 4.5 * np.cos(9 * TIMES)}
+SWINGS = {"joints": {"names": ["left_knee"], "position": "q", "velocity": "v"}}
+
+
+@pytest.mark.parametrize(
+    "changed", [np.degrees(SWING["v"]), -SWING["v"], SWING["v"][::-1] ** 2, SWING["v"] / 9]
+)
+def test_speeds_that_are_not_those_of_the_angles_are_warned_of(changed):
+    assert not any("speeds say" in each for each in played(log_of(**SWING), **SWINGS).warnings)
+    wrong = played(log_of(q=SWING["q"], v=changed), **SWINGS).warnings
+    assert any(
+        "left_knee moves" in each and "times as fast as its speeds say" in each for each in wrong
+    )
+
+
+def test_a_truth_that_is_not_the_imus_is_warned_of():
+    """A base that rolls by 0.4 rad with a heading of 1 rad, and what its IMU reads."""
+    scipy = pytest.importorskip("scipy.spatial.transform")
+    roll = 0.4 * np.sin(9 * TIMES)
+    turns = scipy.Rotation.from_euler("xyz", np.stack([roll, 0 * roll, 1.0 + 0 * roll], axis=1))
+    right = {"gyro": np.stack([3.6 * np.cos(9 * TIMES), 0 * roll, 0 * roll], axis=1),
+             "force": turns.inv().apply(REST), "place": np.zeros((COUNT, 3)), "turn": turns.as_quat()}  # fmt: skip
+    truth = {"position": "place", "quaternion": "turn"}
+
+    def warned(truth=truth, **changed):
+        return " ".join(played(log_of(**right | changed), truth=truth).warnings)
+
+    assert "truth" not in warned()
+    assert "rad off the vertical: look at unit and order of truth" in warned(
+        {**truth, "order": "wxyz"}
+    )
+    inverse = turns.inv().as_quat()
+    assert "the truth turns" in warned(turn=inverse)
+    assert "the truth turns 0.017 times as fast" in warned(gyro=np.degrees(right["gyro"]))
+    assert "the truth turns -1" in warned(gyro=-right["gyro"])
+
+
+def test_a_file_that_has_the_joints_in_another_order_is_not_taken_for_the_robots():
+    names = [joint.name for joint in find_robot("bruce").joints]
+    log = log_of(q=np.zeros((COUNT, len(names))))
+    log.texts["order"] = names[::-1]
+    text = said(log, joints={"position": "q"})
+    assert "the file has the joints in another order than the robot | no names | order" in text
+    assert not said(log, joints={"position": "q", "names": "order"})
 
 
 def test_gravities_and_units_that_are_none():

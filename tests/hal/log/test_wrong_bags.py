@@ -13,6 +13,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 STORE.register(get_types_from_msg("float32 q\nint8 mode", "quadruped/msg/Motor"))
+STORE.register(get_types_from_msg("string name\nfloat64 q", "quadruped/msg/Part"))
+STORE.register(get_types_from_msg("Part[] parts", "quadruped/msg/Parts"))
 STORE.register(get_types_from_msg("Motor[3] motors\nfloat32[3] gyro\nuint32 tick\nfloat64[] more\nstring note", "quadruped/msg/State"))  # fmt: skip
 TYPES = STORE.types
 NUMBER = "std_msgs/msg/Float64"
@@ -73,6 +75,28 @@ def test_messages_of_a_robots_own(tmp_path, plugin):
 def test_bags_that_are_packed(tmp_path, packed):
     log = read_log(write(tmp_path, states(), StoragePlugin.SQLITE3, packed))
     assert log.array("low_state.tick").values[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+def test_parts_that_change_their_order_are_refused(tmp_path):
+    part, kind = TYPES["quadruped/msg/Part"], "quadruped/msg/Parts"
+
+    def bag(name, swap):
+        messages = [("/ok", NUMBER, k * MS, number(k)) for k in range(5)]
+        for k in range(5):
+            parts = [part(name="hip", q=1.0), part(name="knee", q=2.0)]
+            messages.append(("/p", kind, k * MS, TYPES[kind](parts[::-1] if k == swap else parts)))
+        (tmp_path / name).mkdir()
+        return read_log(write(tmp_path / name, messages))
+
+    same = bag("same", 99)
+    assert same.array("p.parts.q").values[4].tolist() == [1.0, 2.0]
+    assert same.texts["p.parts.name"] == ["hip", "knee"]
+    text = r"p\.parts is not of the same parts all along: p\.parts\.name changes .* in row 3"
+    with pytest.raises(LogError, match=text):
+        bag("swapped", 3).array("p.parts.q")
+    (tmp_path / "a.bag").mkdir()
+    with pytest.raises(LogError, match=r"a\.bag is a folder that is called like a file of ROS 1: rename it"):  # fmt: skip
+        read_log(tmp_path / "a.bag")
 
 
 def test_topics_whose_names_differ_by_a_line_are_apart(tmp_path):

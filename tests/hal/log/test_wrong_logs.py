@@ -84,6 +84,8 @@ def test_a_table_that_is_not_understood_says_where(tmp_path, text, said):
 
 
 def test_what_is_packed_or_a_part_is_named(tmp_path):
+    with pytest.raises(LogError, match=r"cannot read log\.xyz: there is no such file"):
+        read_log(tmp_path / "log.xyz")
     csv(tmp_path, gzip.compress(b"t,q\n0,1\n1,2\n"), "log.csv.gz")
     with pytest.raises(LogError, match=r"log\.csv\.gz is compressed: unpack it first"):
         read_log(tmp_path / "log.csv.gz")

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aloft.blocks.general.integrators_and_delays import UnitDelay
 from aloft.blocks.general.sources import SineWave
 from aloft.blocks.general.vectors import Vector
 from aloft.files.problems import LoadError
@@ -141,9 +142,9 @@ def test_consecutive_blocks_of_a_phase_are_one_call_with_the_same_bytes() -> Non
     fused, single = ticker(fuse=True), ticker(fuse=False)
     assert chains(fused) == [
         ("wave", "one", "two"),
-        ("three",),
+        ("three", ""),  # and the finite check
         ("wave", "one", "slow", "two"),
-        ("three",),
+        ("three", ""),
     ]
     assert chains(single) == []
     for _ in range(40):
@@ -151,6 +152,28 @@ def test_consecutive_blocks_of_a_phase_are_one_call_with_the_same_bytes() -> Non
         single.advance(1)
         assert fused.bound.snapshot() == single.bound.snapshot()
     assert fused.bound.memory.bus.field("three.y.value").any()
+
+
+@pytest.mark.parametrize("fuse", [True, False])
+def test_a_value_that_is_not_finite_ends_the_run_before_updates(fuse: bool) -> None:
+    graph = checked_graph(
+        {
+            "wave": BlockUse(SineWave, {"frequency": 10.0}),
+            "one": BlockUse(Smooth, wires={"u": "wave.y"}),
+            "behind": BlockUse(UnitDelay, {"initial": [0.5]}, {"u": "one.y"}),
+        }
+    )
+    executor = Executor(graph, fuse=fuse)
+    executor.start()
+    made = executor.ticker
+    assert chains(made) == ([("behind", "wave", "one", "", "behind")] if fuse else [])
+    made.advance(3)
+    before = made.bound.memory.state.field("behind.x.value").copy()
+    made.bound.memory.bus.field("one.y.value")[0] = np.nan
+    wrong = r"block 'one' wrote a value that is not finite at tick 3 .*: one.y.value\[0\] is nan"
+    with pytest.raises(RunError, match=wrong):
+        made.advance(1)
+    assert np.array_equal(made.bound.memory.state.field("behind.x.value"), before)
 
 
 def test_the_executor_fuses_unless_it_is_told_not_to() -> None:
@@ -218,7 +241,7 @@ def test_a_failure_names_the_block(fuse: bool) -> None:
     result = Executor(graph(limit=3), fuse=fuse).run(30)
     assert result.reason == (
         "block 'slow' failed at tick 11 (0.022 s): ZeroDivisionError: "
-        f"{__file__}:53: kernel divide divided by zero"
+        f"{__file__}:54: kernel divide divided by zero"
     )
     assert result.error is not None and (result.error.block, result.error.tick) == ("slow", 11)
 

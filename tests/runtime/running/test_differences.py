@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from aloft.runtime.language.layout import Layout, PortLayout
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.running.differences import (
-    Comparison,
+    RowComparison,
     Translation,
     common_names,
     ulp_distance,
@@ -68,7 +68,7 @@ def test_special_numbers() -> None:
 
 
 def test_equal_rows() -> None:
-    comparison = Comparison(LAYOUT, ["early", "late"])
+    comparison = RowComparison(LAYOUT, ["early", "late"])
     comparison.add(TICKS, rows(), rows())
     assert comparison.first is None and comparison.elements == 0 and comparison.compared == 5
 
@@ -80,7 +80,7 @@ def test_the_first_difference_is_the_earliest_and_upstream() -> None:
     other = put(other, "early.y.x", (2, 0, 1), 1.0 - 2**-52)
     other = put(other, "early.y.x", (4, 0, 0), 7.0)
     other = put(other, "late.y.n", (3, 2), 12)
-    comparison = Comparison(LAYOUT, ["early", "late"])
+    comparison = RowComparison(LAYOUT, ["early", "late"])
     comparison.add(TICKS[:2], base[:2], other[:2])
     comparison.add(TICKS[2:], base[2:], other[2:])
     first = comparison.first
@@ -97,7 +97,7 @@ def test_the_first_difference_is_the_earliest_and_upstream() -> None:
 
 def test_nan_equals_itself_and_the_sign_of_zero_counts() -> None:
     base = put(rows(), "late.y.x", (0, 0, 0), math.nan)
-    comparison = Comparison(LAYOUT, ["early", "late"])
+    comparison = RowComparison(LAYOUT, ["early", "late"])
     comparison.add(TICKS, base, base.copy())
     assert comparison.first is None
     comparison.add(TICKS, base, put(base, "late.y.x", (0, 0, 0), 1.0))
@@ -110,7 +110,7 @@ def test_nan_equals_itself_and_the_sign_of_zero_counts() -> None:
 
 def test_only_some_fields() -> None:
     base = rows()
-    comparison = Comparison(LAYOUT, ["early", "late"], names=["early.y.n"])
+    comparison = RowComparison(LAYOUT, ["early", "late"], names=["early.y.n"])
     comparison.add(TICKS, base, put(base, "late.y.x", (0, 0, 0), 5.0))
     assert comparison.first is None
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import aloft
+from aloft.mathematics.compiling.compile_calls import compile_calls
 from aloft.runtime.language.layout import Layout, PortLayout
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.running.finite import FiniteCheck, NotFiniteError
@@ -23,6 +24,20 @@ def region() -> Region:
     return Region(Layout.of([PortLayout("a/b.y", Many, {})]))
 
 
+def compiled_finds(check: FiniteCheck) -> bool:
+    """Whether the machine code finds a value that is not finite, as plain Python does."""
+    found = []
+    for compiled in (False, True):
+        if compiled:
+            assert compile_calls(check.calls) == "" and check.compiled
+        check.found[0] = 0
+        for call in check.calls:
+            call.run()
+        found.append(bool(check.found[0]))
+    assert found[0] == found[1]
+    return found[1]
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize(
     ("field", "index", "place"),
@@ -32,10 +47,13 @@ def test_it_names_the_element(bad: float, field: str, index: object, place: str)
     memory = region()
     check = FiniteCheck(memory)
     check.check()
+    assert not compiled_finds(check)
     memory.field(f"a/b.y.{field}")[index] = bad
+    assert compiled_finds(check)
     with pytest.raises(NotFiniteError) as caught:
         check.check()
     assert str(caught.value) == f"{place} is {bad}"
+    assert not check.found[0]
 
 
 def test_the_first_of_several_is_named() -> None:
@@ -50,10 +68,13 @@ def test_finite_numbers_of_any_size_pass(size: float) -> None:
     memory = region()
     memory.field("a/b.y.vector").fill(size)
     FiniteCheck(memory).check()
+    assert not compiled_finds(FiniteCheck(memory))
 
 
 def test_a_region_without_floats_passes() -> None:
-    FiniteCheck(Region(Layout.of([]))).check()
+    check = FiniteCheck(Region(Layout.of([])))
+    check.check()
+    assert not check.compiled
 
 
 def test_numpy_does_not_warn_of_what_is_found() -> None:
