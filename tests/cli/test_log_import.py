@@ -193,6 +193,24 @@ def test_shuffled_columns_of_a_log_get_their_joints(tmp_path: Path) -> None:
     assert any("--joints NAME,NAME,..." in note for note in said["notes"]) == ("?" in names)
 
 
+def test_columns_of_another_unit_or_length_are_no_obstacle(tmp_path: Path) -> None:
+    head = "time [s]," + ",".join(f"q{k} [m]" for k in range(1, 11)) + "\n"
+    rows = "".join(f"{0.01 * k}," + ",".join(["0.1"] * 10) + "\n" for k in range(50))
+    (tmp_path / "log.csv").write_text(head + rows)
+    said, played = imported(tmp_path / "log.csv", "bruce", tmp_path / "log.yaml")
+    assert played["joints"]["position"] == [f"q{k}" for k in range(1, 11)]
+    assert {each["sure"] for each in said["joints"]} <= {"assumed", "open"}
+    assert any("no contacts of feet were found" in note for note in said["notes"])
+    standing_log(tmp_path / "log.npz", np.arange(len(NAMES)))
+    arrays = dict(np.load(tmp_path / "log.npz"))
+    arrays["joint_velocity"] = arrays["joint_velocity"][::2]
+    np.savez(tmp_path / "log.npz", **arrays)
+    said, _ = imported(tmp_path / "log.npz", "bruce", tmp_path / "half.yaml")
+    assert not any(
+        each["joint"] not in (None, name) for each, name in zip(said["joints"], NAMES, strict=True)
+    )
+
+
 @pytest.mark.parametrize("right", [True, False])
 def test_names_in_the_file_are_taken_and_held_against_the_feet(tmp_path: Path, right: bool) -> None:
     order = np.random.default_rng(2).permutation(len(NAMES))
