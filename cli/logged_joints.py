@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..hal.log.played_log import NO_JOINT, UNNAMED
 from ..mathematics.arrays import Array, Flags2D
 from ..runtime.language.errors import AloftError
 
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from ..hal.log.standing_feet import LoggedMotion
     from ..robots.robot_description import RobotDescription
 
-NONE, OPEN = "-", "?"
-"""In place of a name: a column that is no joint of the robot, and one whose joint is not known yet."""
 PERIOD, LONGEST = 0.005, 600.0
 """Between the samples of the log that are looked at, and how much of it is [s]."""
 SMOOTH, LEVEL, IMPACT = 0.04, 1.0, 0.05
@@ -163,12 +162,12 @@ def _check_given(
     if len(given) != len(labels):
         raise AloftError(
             f"--joints has {len(given)} names, expected {len(labels)}: one for each column from {labels[0]} to {labels[-1]}, in that order, "
-            f"and {NONE} for one that is no joint of the robot"
+            f"and {NO_JOINT} for one that is no joint of the robot"
         )
     own = [] if robot is None else [joint.name for joint in robot.joints]
     for name in given:
         near = get_close_matches(name, own, 1, 0.5)
-        if near and name not in own and name not in (NONE, OPEN):
+        if near and name not in own and name not in (NO_JOINT, UNNAMED):
             raise AloftError(f"--joints: the robot has no joint {name}; did you mean {near[0]}?")
 
 
@@ -179,7 +178,7 @@ def _guessed(
 
     motions = _motions(log, played, robot)
     guesses = guess_columns(robot, list(motions.values()))
-    names = [OPEN if guess.joint is None else guess.joint for guess in guesses]
+    names = [UNNAMED if guess.joint is None else guess.joint for guess in guesses]
     found = LoggedJoints(
         names,
         [Named(label, g.joint, g.sure, g.why) for label, g in zip(labels, guesses, strict=True)],
@@ -191,10 +190,10 @@ def _guessed(
             "neither an IMU nor motion capture was found, so only standing on two feet tells the legs' columns"
         )
     _look(found, motions, robot, names)
-    if OPEN in names:
+    if UNNAMED in names:
         found.notes.append(
-            f"{names.count(OPEN)} columns have no name yet, {OPEN} in joints.names: write their joints there, as the driver's documentation "
-            f"has them, or import again with --joints NAME,NAME,... for all {len(names)} in the columns' order; {NONE} is no joint of the robot"
+            f"{names.count(UNNAMED)} columns have no name yet, {UNNAMED} in joints.names: write their joints there, as the driver's documentation "
+            f"has them, or import again with --joints NAME,NAME,... for all {len(names)} in the columns' order; {NO_JOINT} is no joint of the robot"
         )
     return found
 

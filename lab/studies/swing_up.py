@@ -63,17 +63,17 @@ _LOGGED: dict[str, dict[str, Any]] = {
     "latency 2 ms, gears of 1000 N m/rad": {"latency": "2 ms", "gears": _GEARS},
 }  # fmt: skip
 _STIFF: dict[str, dict[str, Any]] = {
-        "friction and rotors": {},
-        "latency 3 ms": {"latency": "3 ms"},
-        "latency 4 ms": {"latency": "4 ms"},
-        "latency 4 ms, static friction x 3": {"latency": "4 ms", "joints": {"static_friction": 3.0}},
-        "latency 4 ms, encoders of 2 mrad": {"latency": "4 ms", "sensors": {"encoder_resolution": 0.002}},
-        "latency 5 ms": {"latency": "5 ms"},
-        "latency 8 ms": {"latency": "8 ms"},
-        "latency 8 ms, speed noise": {"latency": "8 ms", "noise": 0.05},
-        "latency 8 ms, static friction x 2": {"latency": "8 ms", "joints": {"static_friction": 2.0}},
-        "latency 2 ms, gears of 1000 N m/rad": {"latency": "2 ms", "gears": _GEARS},
-        "the same, play of 10 mrad": {"latency": "2 ms", "gears": {**_GEARS, "backlash": 0.01}},
+    "friction and rotors": {},
+    "latency 3 ms": {"latency": "3 ms"},
+    "latency 4 ms": {"latency": "4 ms"},
+    "latency 4 ms, static friction x 3": {"latency": "4 ms", "joints": {"static_friction": 3.0}},
+    "latency 4 ms, encoders of 2 mrad": {"latency": "4 ms", "sensors": {"encoder_resolution": 0.002}},
+    "latency 5 ms": {"latency": "5 ms"},
+    "latency 8 ms": {"latency": "8 ms"},
+    "latency 8 ms, speed noise": {"latency": "8 ms", "noise": 0.05},
+    "latency 8 ms, static friction x 2": {"latency": "8 ms", "joints": {"static_friction": 2.0}},
+    "latency 2 ms, gears of 1000 N m/rad": {"latency": "2 ms", "gears": _GEARS},
+    "the same, play of 10 mrad": {"latency": "2 ms", "gears": {**_GEARS, "backlash": 0.01}},
 }  # fmt: skip
 EFFECTS = _LOGGED | {f"stiff: {name}": {"stiff": True, **each} for name, each in _STIFF.items()}
 
