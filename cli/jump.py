@@ -267,7 +267,7 @@ def task_of(graph: Graph) -> JumpTask:
 
 def plan_of(task: JumpTask, graph: Graph, nearest: bool, out: Console) -> dict[str, Any]:
     """Plan the task as the graph will, show the plan, and return it as in ``aloft plan --json``."""
-    from .plan import plan_task
+    from .shared.planning import plan_task
 
     row = plan_task(task, library_of(graph), False, None, nearest, out, tests=False)
     if row["success"]:

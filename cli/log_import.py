@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import yaml
 
+from ..hal.log.played_log import UNNAMED
 from ..mathematics.constants import GRAVITY
 from ..runtime.language.errors import AloftError
 from .logged_joints import (
-    OPEN,
     LoggedJoints,
     columns_of_joints,
     commented,
@@ -117,7 +117,10 @@ def import_log(
         notes = _arrivals(found, played)
         named = LoggedJoints()
         if "joints" in played:
-            named = name_joints(found, played, described, given)
+            try:
+                named = name_joints(found, played, described, given)
+            except LogError as error:
+                raise AloftError(str(error)) from None
             if named.names is not None:
                 played["joints"] = {**played["joints"], "names": named.names}
         elif given:
@@ -151,7 +154,9 @@ def import_log(
     ]
     console().print(table(str(file), ("column", ">rows", ">width", "unit", "guessed as"), rows))
     if {each.sure for each in named.columns} - {"named", "given"}:
-        joined = [(each.column, each.joint or OPEN, each.sure, each.why) for each in named.columns]
+        joined = [
+            (each.column, each.joint or UNNAMED, each.sure, each.why) for each in named.columns
+        ]
         console().print(table("joints", ("column", "joint", "how sure", "why"), joined))
     for note in notes:
         say(console(), note)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..hal.log.played_log import NO_JOINT, UNNAMED
 from ..mathematics.arrays import Array, Flags2D
 from ..runtime.language.errors import AloftError
 
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from ..hal.log.standing_feet import LoggedMotion
     from ..robots.robot_description import RobotDescription
 
-NONE, OPEN = "-", "?"
-"""In place of a name: a column that is no joint of the robot, and one whose joint is not known yet."""
 PERIOD, LONGEST = 0.005, 600.0
 """Between the samples of the log that are looked at, and how much of it is [s]."""
 SMOOTH, LEVEL, IMPACT = 0.04, 1.0, 0.05
@@ -163,12 +162,12 @@ def _check_given(
     if len(given) != len(labels):
         raise AloftError(
             f"--joints has {len(given)} names, expected {len(labels)}: one for each column from {labels[0]} to {labels[-1]}, in that order, "
-            f"and {NONE} for one that is no joint of the robot"
+            f"and {NO_JOINT} for one that is no joint of the robot"
         )
     own = [] if robot is None else [joint.name for joint in robot.joints]
     for name in given:
         near = get_close_matches(name, own, 1, 0.5)
-        if near and name not in own and name not in (NONE, OPEN):
+        if near and name not in own and name not in (NO_JOINT, UNNAMED):
             raise AloftError(f"--joints: the robot has no joint {name}; did you mean {near[0]}?")
 
 
@@ -179,7 +178,7 @@ def _guessed(
 
     motions = _motions(log, played, robot)
     guesses = guess_columns(robot, list(motions.values()))
-    names = [OPEN if guess.joint is None else guess.joint for guess in guesses]
+    names = [UNNAMED if guess.joint is None else guess.joint for guess in guesses]
     found = LoggedJoints(
         names,
         [Named(label, g.joint, g.sure, g.why) for label, g in zip(labels, guesses, strict=True)],
@@ -191,10 +190,10 @@ def _guessed(
             "neither an IMU nor motion capture was found, so only standing on two feet tells the legs' columns"
         )
     _look(found, motions, robot, names)
-    if OPEN in names:
+    if UNNAMED in names:
         found.notes.append(
-            f"{names.count(OPEN)} columns have no name yet, {OPEN} in joints.names: write their joints there, as the driver's documentation "
-            f"has them, or import again with --joints NAME,NAME,... for all {len(names)} in the columns' order; {NONE} is no joint of the robot"
+            f"{names.count(UNNAMED)} columns have no name yet, {UNNAMED} in joints.names: write their joints there, as the driver's documentation "
+            f"has them, or import again with --joints NAME,NAME,... for all {len(names)} in the columns' order; {NO_JOINT} is no joint of the robot"
         )
     return found
 
@@ -242,7 +241,7 @@ def _motions(
     log: LogFile, played: Mapping[str, Any], robot: RobotDescription
 ) -> dict[str, LoggedMotion]:
     """Return the columns' motion by what tells the base's: `truth`, each place that an IMU may have, or only the feet (empty)."""
-    from ..hal.log.columns import LogClock, at_times, moments_of, numbers, rows_to_keep
+    from ..hal.log.columns import LogClock, at_times, moments_of, rows_to_keep
     from ..hal.log.log_file import LogError
     from ..hal.log.parameters import LogParameters
     from ..hal.log.played_log import play
@@ -250,8 +249,12 @@ def _motions(
     from ..hal.log.turns import rotation_of
 
     joints = played["joints"]
-    raw, own = numbers(log, joints["position"], "rad")
-    kinds = raw, numbers(log, joints["velocity"], "rad/s")[0] if "velocity" in joints else raw
+    raw, own = _angles(log, joints["position"], "rad")
+    kinds = [raw, raw]
+    if "velocity" in joints:
+        speeds, clock = _angles(log, joints["velocity"], "rad/s")
+        if speeds.shape == raw.shape and (own is None) == (clock is None):
+            kinds[1] = speeds
     still = LoggedMotion(raw, np.zeros_like(raw), np.zeros((len(raw), len(robot.feet)), bool))
     try:
         moments = moments_of(log, LogClock.model_validate(played.get("clock", {})), len(raw), own)
@@ -280,7 +283,7 @@ def _motions(
         if rows is None:
             continue
         position, speeds = np.hsplit(at_times(stamps, both, rows.position.times), 2)
-        if "velocity" not in joints:
+        if kinds[1] is raw:
             speeds = np.gradient(position, PERIOD, axis=0)
         moving = position, _mean(speeds, SMOOTH), _steady(rows.closed, robot)
         turn = rotation_of(rows.pose[:, 3:])
@@ -295,6 +298,17 @@ def _motions(
             rate = _mean(rows.twist[:, 3:], SMOOTH)
             found["truth"] = LoggedMotion(*moving, rate, turn[:, 2], _mean(speed, SMOOTH))
     return found or {"": still}
+
+
+def _angles(log: LogFile, columns: Any, unit: str) -> tuple[Array, Array | None]:
+    """Return columns of joints and their own stamps: in a unit of hinges, or of slides as the file has them."""
+    from ..hal.log.columns import numbers
+    from ..hal.log.log_file import LogError
+
+    try:
+        return numbers(log, columns, unit)
+    except LogError:
+        return numbers(log, columns, "")
 
 
 def _mean(values: Array, span: float) -> Array:

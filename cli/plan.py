@@ -10,28 +10,18 @@ import typer
 
 from ..runtime.language.errors import ExitCode
 from .shared.options import JsonBesideTables, expand_option_groups
-from .shared.output import console, errors_reported, print_error, print_json, say
+from .shared.output import console, errors_reported, print_json, say
 from .shared.planning import (
-    failure,
     listed_row,
     listing,
-    nearest_json,
     plan_grid,
-    plan_json,
-    print_plan,
-    recorded_motion,
+    plan_task,
     summary,
 )
 from .shared.rehearsal import LANDING_HELP, REHEARSE_HELP, rehearsal_of_file
-from .shared.viewing import how_to_view
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-    from ..planner.library.library import PlanLibrary
-    from ..planner.task.plan import PlannedJump
-    from ..planner.task.task import JumpTask
-    from ..robots.description import RobotDescription
 
 
 @dataclass(frozen=True)
@@ -171,42 +161,6 @@ def plan_tasks(
     return ExitCode.NOT_SUCCESSFUL if failed else ExitCode.SUCCESS
 
 
-def plan_task(
-    task: JumpTask, library: PlanLibrary, anew: bool, out: Path | None, nearest: bool,
-    screen: Console, *, tests: bool = True,
-) -> dict[str, Any]:  # fmt: skip
-    """Plan one task, print and draw the plan, and return its row. Without ``tests`` those of a valid
-    plan are not printed."""
-    from ..planner.checking.validity import InvalidPlanError
-    from ..planner.solving.solver_process import cpu_time
-    from ..planner.task.files import PlanError
-
-    robot, started = library.robot, cpu_time()
-    try:
-        with screen.status(f"planning {task.name}") as status:
-            found, kept = library.plan(task, solver_with_progress(status.update), anew=anew)
-        reason = "kept from before" if kept else "planned"
-    except InvalidPlanError as error:
-        found, kept, reason = error.plan, False, str(error)
-    except PlanError as error:
-        print_error(str(error))
-        row = failure(task, robot, error)
-        spent = cpu_time() - started
-        return row | (search_nearest(task, library, error.family, spent, screen) if nearest else {})
-    row = plan_json(found, robot, library.path_of(task), kept, reason)
-    row["cpu_s"] = None if kept else cpu_time() - started
-    print_plan(screen, found, robot, tests=tests or not found.valid)
-    if not found.valid:
-        print_error(reason)
-    if out is not None:
-        row |= write_pictures(found, robot, out, screen)
-    if row["path"]:
-        say(screen, f"plan: {row['path']} ({reason})")
-    if not found.valid and nearest:
-        row |= search_nearest(task, library, "", cpu_time() - started, screen)
-    return row
-
-
 def list_plans(keep: Path | None, screen: Console, as_json: bool) -> ExitCode:
     """Print every plan of the library: its task, what it does, and its file."""
     from ..planner.library.library import PlanLibrary
@@ -218,56 +172,3 @@ def list_plans(keep: Path | None, screen: Console, as_json: bool) -> ExitCode:
     if as_json:
         print_json({"success": True, "reason": f"{len(rows)} plans", "plans": rows})
     return ExitCode.SUCCESS
-
-
-def search_nearest(
-    task: JumpTask, library: PlanLibrary, family: str, spent: float, screen: Console
-) -> dict[str, Any]:
-    """Search the nearest task that has a plan, after so much processor time [s] was ``spent`` on it;
-    keep that plan, and return it for the failed task's row."""
-    from ..planner.library.nearest_feasible import nearest_feasible, seconds_left
-
-    with screen.status("searching the nearest task that can be planned") as status:
-
-        def progress(text: str) -> None:
-            status.update(f"searching the nearest task that can be planned: {text}")
-
-        found = nearest_feasible(
-            task, library.robot, family=family, seconds=seconds_left(spent), progress=progress,
-            library=library,
-        )  # fmt: skip
-    if found is None:
-        say(screen, "a short search found no task near it that can be planned")
-        return {"nearest": None}
-    say(screen, found.text)
-    return {"nearest": nearest_json(found, library.add(found.plan))}
-
-
-def solver_with_progress(tell: Any) -> Any:
-    """Return the planner, which prints what it is deriving."""
-    from ..planner.solving.solve import solve_jump
-
-    def make(
-        task: JumpTask, robot: RobotDescription, warm_start: PlannedJump | None
-    ) -> PlannedJump:
-        def progress(text: str, done: int, total: int) -> None:
-            tell(f"planning {task.name}: {text} ({done} of {total})")
-
-        return solve_jump(task, robot, warm_start=warm_start, progress=progress)
-
-    return make
-
-
-def write_pictures(
-    found: PlannedJump, robot: RobotDescription, out: Path, screen: Console
-) -> dict[str, str]:
-    """Write the picture and the recording of a plan."""
-    from ..logs.recording.motion_recording import write_motion
-    from ..planner.drawing.picture import write_picture
-
-    name = found.task.name
-    picture = write_picture(out / f"{name}.svg", found, robot)
-    recording = write_motion(out / f"{name}.rrd", recorded_motion(found, robot), name)
-    say(screen, f"picture: {picture}")
-    say(screen, f"recording: {recording}; to see it: {how_to_view(recording)}")
-    return {"picture": str(picture), "recording": str(recording)}

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..runtime.language.errors import AloftError
+from .shared.live_view import Live, Record, Rerun, leave_viewer, open_viewer, recorder_started
 from .shared.options import (
     CompletedOverrides,
     JsonBesideTables,
@@ -28,17 +26,7 @@ from .shared.output import (
 from .shared.run_graph import OneRunOptions, RunnableGraph, run_many, run_once
 
 if TYPE_CHECKING:
-    from ..logs.recording.recorder_link import RecorderLink
-    from ..logs.viewing.viewer import Viewer
     from ..runtime.live.parameter_endpoint import ParameterEndpoint
-
-
-class Live(StrEnum):
-    """The options of showing a run while it goes on."""
-
-    NONE = "none"
-    LIVE = "live"
-    WEB = "web"
 
 
 @dataclass(frozen=True)
@@ -58,13 +46,8 @@ class GraphOptions:
 class ObservationOptions:
     """The options of recording, showing and reaching a run."""
 
-    record: Annotated[
-        Path | None,
-        typer.Option(help="Where the recording goes; by default recordings/NAME.rrd."),
-    ] = None
-    rerun: Annotated[
-        Live, typer.Option(help="Show the run while it goes on: in a window, in a browser.")
-    ] = Live.NONE
+    record: Record = None
+    rerun: Rerun = Live.NONE
     keep: Annotated[
         int, typer.Option(min=0, help="How many earlier recordings of the same name to keep.")
     ] = 0
@@ -226,19 +209,6 @@ def run(
     raise typer.Exit(code)
 
 
-@contextmanager
-def recorder_started(*, wanted: bool) -> Iterator[RecorderLink | None]:
-    """Start the recorder's process if one is wanted, while the graph is loaded."""
-    from ..logs.recording.recorder_link import start_early
-
-    link = start_early() if wanted else None
-    try:
-        yield link
-    finally:
-        if link is not None:
-            link.close()
-
-
 def check_combination(
     seeds: str, observation: ObservationOptions, parts: PartOptions, real_time: bool
 ) -> None:
@@ -275,38 +245,6 @@ def split_time(text: str) -> float:
     if found <= 0.0:
         raise AloftError(f"--split {text}: expected a time above zero, e.g. '10 min'")
     return found
-
-
-def open_viewer(live: Live, messages: list[str]) -> Viewer | None:
-    """Open the viewer that shows the run. Without a viewer the run is not shown, and ``messages`` gets
-    the reason."""
-    from ..logs.viewing.viewer import ViewerError, start_viewer
-    from .shared.viewing import open_page
-
-    if live is Live.NONE:
-        return None
-    try:
-        viewer = start_viewer("web" if live is Live.WEB else "window")
-    except ViewerError as error:
-        messages.append(f"the run is not shown: {error}")
-        print_warning(messages[-1])
-        return None
-    if live is Live.WEB:
-        typer.echo(f"live view: {viewer.page}", err=True)
-        open_page(viewer.page)
-    return viewer
-
-
-def leave_viewer(viewer: Viewer, *, wait: bool) -> None:
-    """Leave the viewer open after the run: a window until it is closed, a page until Ctrl-C."""
-    from .shared.viewing import keep_open
-
-    if viewer.kind != "web":
-        return
-    if wait and viewer.is_alive():
-        keep_open(viewer)
-    else:
-        viewer.stop()
 
 
 def open_endpoint(

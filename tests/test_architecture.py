@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from aloft.cli.verbs import CORE as VERBS
 from aloft.runtime.language.extensions import own_extensions
 from aloft.runtime.language.registry import find_block, known_names
 
@@ -321,6 +322,18 @@ def test_no_block_imports_another_blocks_file() -> None:
         if (target := own(name)) in blocks
     ]
     assert not wrong, "shared mathematics belongs in a module of its own"
+
+
+def test_no_verb_imports_another_verb() -> None:
+    verbs = {("cli", path.stem) for path in (ROOT / "cli").glob("*.py") if path.stem in VERBS}
+    assert len(verbs) > 10, "the rule below would check nothing"
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {'.'.join(target)}"
+        for path in [*files("cli"), *files("extensions"), *files("lab")]
+        for name in imports(path)
+        if (target := own(name)) in verbs
+    ]
+    assert not wrong, "what verbs share belongs in cli/shared"
 
 
 def test_blocks_can_be_imported_without_the_libraries_they_compute_with() -> None:

@@ -53,10 +53,12 @@ class NotFiniteError(AloftError):
 @kernel
 def find_not_finite(values: Array, found: Indices) -> None:
     """Set ``found`` to one where a value is not finite."""
-    count = 0
-    for k in range(values.size):  # the difference is not zero, but no number
-        count += int(values[k] - values[k] != 0.0)
-    if count > 0:
+    wrong = 0
+    for k in range(
+        values.size
+    ):  # the difference is not zero, but no number; no sum, which could overflow
+        wrong |= int(values[k] - values[k] != 0.0)
+    if wrong:
         found[0] = 1
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ....cli.replay import as_data, print_differences, write
 from ....cli.shared.options import GraphFolder, JsonBesideTables, Trust, opened_recording
 from ....cli.shared.output import (
     SET_HELP,
@@ -18,6 +17,7 @@ from ....cli.shared.output import (
     say,
     table,
 )
+from ....cli.shared.replayed import as_data, print_differences, write_runs
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -51,7 +51,7 @@ def branch(
         end = None if until is None else round(until * rate)
         done = branch_run(opened, round(at * rate), graph, until=end)
         path = output or recording.with_name(f"{recording.stem}-branch.rrd")
-        written = write(path, opened, done)
+        written = write_runs(path, opened, done)
     first = done.first
     verdict = (
         f"as recorded, every byte of {done.signals.compared} ticks" if first is None

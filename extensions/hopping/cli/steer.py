@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ....cli.run import Live, leave_viewer, open_viewer, recorder_started
+from ....cli.shared.live_view import (
+    Live,
+    Record,
+    Rerun,
+    leave_viewer,
+    open_viewer,
+    recorder_started,
+)
 from ....cli.shared.options import CompletedOverrides, JsonBesideTables, NoRecord, Quiet
 from ....cli.shared.output import console, errors_reported, progress_bar, say
 from ....cli.shared.robot_trials import about_robot, robot_setting
@@ -36,12 +43,8 @@ def steer(
         ),
     ] = None,
     overrides: CompletedOverrides = None,
-    rerun: Annotated[
-        Live, typer.Option(help="Show the run while it goes on: in a window, in a browser.")
-    ] = Live.NONE,
-    record: Annotated[
-        Path | None, typer.Option(help="Where the recording goes; by default recordings/NAME.rrd.")
-    ] = None,
+    rerun: Rerun = Live.NONE,
+    record: Record = None,
     no_record: NoRecord = False,
     as_json: JsonBesideTables = False,
     quiet: Quiet = False,

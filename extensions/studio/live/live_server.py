@@ -143,21 +143,15 @@ class LiveServer(ThreadingHTTPServer):
         run: what is shown.
         save: the file for changed values.
         opened: what the side of the page shows at first.
-        port: by default any that is free.
 
     Attributes:
         token: the secret in the address.
-
-    Raises:
-        OSError: the port is taken.
     """
 
     daemon_threads = True
 
-    def __init__(
-        self, run: WatchedRun, save: Path, opened: Opened = "diagram", port: int = 0
-    ) -> None:
-        super().__init__((ADDRESS, port), _RequestHandler)
+    def __init__(self, run: WatchedRun, save: Path, opened: Opened = "diagram") -> None:
+        super().__init__((ADDRESS, 0), _RequestHandler)  # any port that is free
         self.run, self.save, self.opened = run, save, opened
         self.token = secrets.token_urlsafe(24)
         self._tunables: tuple[CheckedGraph, Tunables] | None = None

@@ -112,3 +112,33 @@ def test_only_observers_see_the_truth() -> None:
         for spec in graph.blocks
         for wire in spec.wires.values()
     )
+
+
+@pytest.mark.parametrize("align", ["start", "world"])
+def test_motion_capture_in_a_world_of_its_own_is_aligned_by_yaw_and_place_of_the_first_sample(
+    align: str,
+) -> None:
+    bench = BlockBench(EstimatorScore, {"align": align}, robot="bruce", rate=1 / PERIOD)
+    yaw, place = 1.2, np.array([3.0, -2.0, 0.5])
+    other = half([0.0, 0.0, yaw])
+    turn = np.array(
+        [[math.cos(yaw), -math.sin(yaw), 0.0], [math.sin(yaw), math.cos(yaw), 0.0], [0.0, 0.0, 1.0]]
+    )
+    bench.set("truth", contact_touched=True)
+    for k in range(50):
+        own, velocity = np.array([0.4 * k * PERIOD, 0.0, 0.5]), np.array([0.4, 0.0, 0.0])
+        lean = half([0.1, 0.05 + 0.001 * k, 0.02 * k])
+        bench.set("base", position=own, linear_velocity=velocity, orientation=lean)
+        bench.set(
+            "truth", base_position=turn @ own + place, base_orientation=times(other, lean),
+            base_linear_velocity=turn @ velocity,
+        )  # fmt: skip
+        bench.step()
+    found = dict(bench.block.metrics())
+    names = ("position_end_m", "velocity_rms_m_s", "yaw_rms_rad", "tilt_rms_rad")
+    apart = [found[f"estimator_{name}"] for name in names]
+    if align == "start":
+        assert apart == pytest.approx([0.0] * 4, abs=1e-9)
+    else:
+        assert apart[0] > 3.0 and apart[1] > 0.4 and apart[2] == pytest.approx(yaw)
+        assert apart[3] == pytest.approx(0.0, abs=1e-9), "tilt needs no alignment"
