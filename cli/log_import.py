@@ -117,7 +117,10 @@ def import_log(
         notes = _arrivals(found, played)
         named = LoggedJoints()
         if "joints" in played:
-            named = name_joints(found, played, described, given)
+            try:
+                named = name_joints(found, played, described, given)
+            except LogError as error:
+                raise AloftError(str(error)) from None
             if named.names is not None:
                 played["joints"] = {**played["joints"], "names": named.names}
         elif given:

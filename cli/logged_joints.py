@@ -241,7 +241,7 @@ def _motions(
     log: LogFile, played: Mapping[str, Any], robot: RobotDescription
 ) -> dict[str, LoggedMotion]:
     """Return the columns' motion by what tells the base's: `truth`, each place that an IMU may have, or only the feet (empty)."""
-    from ..hal.log.columns import LogClock, at_times, moments_of, numbers, rows_to_keep
+    from ..hal.log.columns import LogClock, at_times, moments_of, rows_to_keep
     from ..hal.log.log_file import LogError
     from ..hal.log.parameters import LogParameters
     from ..hal.log.played_log import play
@@ -249,8 +249,12 @@ def _motions(
     from ..hal.log.turns import rotation_of
 
     joints = played["joints"]
-    raw, own = numbers(log, joints["position"], "rad")
-    kinds = raw, numbers(log, joints["velocity"], "rad/s")[0] if "velocity" in joints else raw
+    raw, own = _angles(log, joints["position"], "rad")
+    kinds = [raw, raw]
+    if "velocity" in joints:
+        speeds, clock = _angles(log, joints["velocity"], "rad/s")
+        if speeds.shape == raw.shape and (own is None) == (clock is None):
+            kinds[1] = speeds
     still = LoggedMotion(raw, np.zeros_like(raw), np.zeros((len(raw), len(robot.feet)), bool))
     try:
         moments = moments_of(log, LogClock.model_validate(played.get("clock", {})), len(raw), own)
@@ -279,7 +283,7 @@ def _motions(
         if rows is None:
             continue
         position, speeds = np.hsplit(at_times(stamps, both, rows.position.times), 2)
-        if "velocity" not in joints:
+        if kinds[1] is raw:
             speeds = np.gradient(position, PERIOD, axis=0)
         moving = position, _mean(speeds, SMOOTH), _steady(rows.closed, robot)
         turn = rotation_of(rows.pose[:, 3:])
@@ -294,6 +298,17 @@ def _motions(
             rate = _mean(rows.twist[:, 3:], SMOOTH)
             found["truth"] = LoggedMotion(*moving, rate, turn[:, 2], _mean(speed, SMOOTH))
     return found or {"": still}
+
+
+def _angles(log: LogFile, columns: Any, unit: str) -> tuple[Array, Array | None]:
+    """Return columns of joints and their own stamps: in a unit of hinges, or of slides as the file has them."""
+    from ..hal.log.columns import numbers
+    from ..hal.log.log_file import LogError
+
+    try:
+        return numbers(log, columns, unit)
+    except LogError:
+        return numbers(log, columns, "")
 
 
 def _mean(values: Array, span: float) -> Array:

@@ -13,6 +13,7 @@ from .log_file import LogFile
 from .parameters import LogParameters
 from .played_rows import PlayedLog, PlayedRows
 from .series import GAP, Series
+from .turns import rotation_of
 
 MANY_REPEATS = 0.02
 """A share of samples that repeat the one before, above which there is a warning."""
@@ -167,7 +168,7 @@ def _of_speeds(params: LogParameters, robot: RobotDescription, rows: PlayedRows)
 def _of_truth(params: LogParameters, rows: PlayedRows) -> Iterator[str]:
     if params.truth is None or params.imu is None:
         return
-    force = _in_world(rows.pose[:, 3:], rows.imu[:, 3:]).mean(axis=0)
+    force = np.einsum("nij,nj->i", rotation_of(rows.pose[:, 3:]), rows.imu[:, 3:])
     off = float(np.arctan2(np.hypot(force[0], force[1]), force[2]))
     if off > MOST_TILTED:
         yield (
@@ -196,13 +197,6 @@ def _of_truth(params: LogParameters, rows: PlayedRows) -> Iterator[str]:
 def _share(found: Array, told: Array) -> float:
     """Return how much of what is told is found, by least squares."""
     return float(np.sum(found * told) / max(np.sum(told**2), 1e-12))
-
-
-def _in_world(turn: Array, vectors: Array) -> Array:
-    """Return vectors (n, 3) turned by quaternions x, y, z, w (n, 4)."""
-    axis, w = turn[:, :3], turn[:, 3:]
-    across = 2.0 * np.cross(axis, vectors)
-    return vectors + w * across + np.cross(axis, across)
 
 
 def _of_mounting(log: LogFile, params: LogParameters, robot: RobotDescription) -> Iterator[str]:

@@ -169,14 +169,14 @@ def test_an_icubs_columns_without_names_are_told_by_its_feet_or_left_open(
     )
 
 
-def standing_log(file: Path, order: np.ndarray) -> None:
-    """Write a log of BRUCE on one foot, then on the other, its columns in an order."""
+def standing_log(file: Path, order: np.ndarray, **more: Any) -> None:
+    """Write a log of BRUCE on one foot, then on the other, its columns in an order, and ``more`` arrays."""
     motion = shuffled(stepping(2), order)
     time = PERIOD * np.arange(len(motion.position))
     force = dict(zip((foot.name for foot in BRUCE.feet), 60.0 * motion.closed.T, strict=True))
     np.savez(
         file, time=time, joint_position=motion.position, joint_velocity=motion.velocity, gyro=motion.rate,
-        specific_force=9.81 * motion.up, left_force_z=force["left_foot"], right_force_z=force["right_foot"],
+        specific_force=9.81 * motion.up, left_force_z=force["left_foot"], right_force_z=force["right_foot"], **more,
     )  # fmt: skip
 
 
@@ -191,6 +191,39 @@ def test_shuffled_columns_of_a_log_get_their_joints(tmp_path: Path) -> None:
         "open" if name == "?" else "told" for name in names
     ]
     assert any("--joints NAME,NAME,..." in note for note in said["notes"]) == ("?" in names)
+
+
+def test_columns_of_another_unit_or_length_are_no_obstacle(tmp_path: Path) -> None:
+    head = "time [s]," + ",".join(f"q{k} [m]" for k in range(1, 11)) + "\n"
+    rows = "".join(f"{0.01 * k}," + ",".join(["0.1"] * 10) + "\n" for k in range(50))
+    (tmp_path / "log.csv").write_text(head + rows)
+    said, played = imported(tmp_path / "log.csv", "bruce", tmp_path / "log.yaml")
+    assert played["joints"]["position"] == [f"q{k}" for k in range(1, 11)]
+    assert {each["sure"] for each in said["joints"]} <= {"assumed", "open"}
+    assert any("no contacts of feet were found" in note for note in said["notes"])
+    standing_log(tmp_path / "log.npz", np.arange(len(NAMES)))
+    arrays = dict(np.load(tmp_path / "log.npz"))
+    arrays["joint_velocity"] = arrays["joint_velocity"][::2]
+    np.savez(tmp_path / "log.npz", **arrays)
+    said, _ = imported(tmp_path / "log.npz", "bruce", tmp_path / "half.yaml")
+    assert not any(
+        each["joint"] not in (None, name) for each, name in zip(said["joints"], NAMES, strict=True)
+    )
+
+
+@pytest.mark.parametrize("right", [True, False])
+def test_names_in_the_file_are_taken_and_held_against_the_feet(tmp_path: Path, right: bool) -> None:
+    order = np.random.default_rng(2).permutation(len(NAMES))
+    names = [NAMES[k] for k in order] if right else NAMES
+    standing_log(tmp_path / "log.npz", order, listed=np.array(names), other=np.array(["a", "b"]))
+    said, played = imported(tmp_path / "log.npz", "bruce", tmp_path / "log.yaml")
+    assert played["joints"]["names"] == "listed"
+    assert [(each["joint"], each["sure"]) for each in said["joints"]] == [
+        (n, "named") for n in names
+    ]
+    still = any("the feet stand still with these names" in note for note in said["notes"])
+    wrong = any("look at the names of the legs' joints" in note for note in said["notes"])
+    assert (still, wrong) == (right, not right), said["notes"]
 
 
 @pytest.mark.parametrize(
