@@ -1,4 +1,4 @@
-"""The tables and pictures of docs/real_logs.md: estimators, dynamics and a swing-up on logs of real robots.
+"""The tables and pictures of docs/real_logs.md: estimators, dynamics and a swing-up on logs of real robots, and drawn walks.
 
 ::
 
@@ -17,9 +17,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ...plotting import Curve, Panel, save_panels
-from . import DATA, ROOT, icub_estimators, pendulum_dynamics, swing_up
+from . import DATA, ROOT, drawn_walks, icub_estimators, pendulum_dynamics, swing_up
 
-PARTS = ("estimators", "starts", "dynamics", "swing_up")
+PARTS = ("estimators", "starts", "walks", "dynamics", "swing_up")
 
 
 def _dynamics(picture: Path | None) -> Iterator[str]:
@@ -56,6 +56,8 @@ def main() -> None:
                 icub_estimators.draw(picture)
         elif part == "starts":
             lines = icub_estimators.start_rows()
+        elif part == "walks":
+            lines = drawn_walks.rows()
         elif part == "dynamics":
             lines = _dynamics(picture)
         else:
