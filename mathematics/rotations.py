@@ -21,6 +21,8 @@ from .linear_algebra import product
 
 _SMALL = 1e-8
 """Below this angle [rad] the series to second order is exact to the last bit."""
+_VERTICAL = 1e-8
+"""The cosine of pitch below which rounding alone would choose roll and yaw."""
 
 
 @kernel
@@ -319,17 +321,21 @@ def from_euler(angles: Array1D, out: Array1D) -> None:
 def to_euler(quaternion: Array1D, out: Array1D) -> None:
     """Roll (-pi to pi), pitch (-pi/2 to pi/2) and yaw (-pi to pi) [rad] of a unit quaternion.
 
-    Where pitch is at its end only the sum or difference of the others is defined, and they are
-    ill-conditioned near it.
+    Where pitch is within 1e-8 rad of its end only the sum or difference of the others is defined: roll is zero there.
     """
     x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     sine = 2.0 * (w * y - z * x)
     side = 2.0 * (x * y + w * z)
     front = 1.0 - 2.0 * (y * y + z * z)
-    out[0] = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    level = math.sqrt(side * side + front * front)
     # not the arc sine, which would lose half the digits near its end
-    out[1] = atan2(sine, math.sqrt(side * side + front * front))
-    out[2] = atan2(side, front)
+    out[1] = atan2(sine, level)
+    if level < _VERTICAL:
+        out[0] = 0.0
+        out[2] = atan2(2.0 * (w * z - x * y), 1.0 - 2.0 * (x * x + z * z))
+    else:
+        out[0] = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        out[2] = atan2(side, front)
 
 
 def axis_rotations(axis: Sequence[float], angles: Array) -> Array:

@@ -182,8 +182,8 @@ class MatrixToQuaternion(Block):
 class QuaternionToEuler(QuaternionInput, Block):
     """Roll, pitch and yaw of a unit quaternion: R = Rz(yaw) Ry(pitch) Rx(roll).
 
-    Roll and yaw jump where they pass pi, and near a pitch of +-pi/2 they are ill-conditioned: use
-    them to look at, and quaternions to control with.
+    Roll and yaw jump where they pass pi, near a pitch of +-pi/2 they are ill-conditioned, and within 1e-8 rad of it
+    roll is zero: use them to look at, and quaternions to control with.
     """
 
     u = Input(Quaternion, text="the unit quaternion")

@@ -222,3 +222,18 @@ def test_there_and_back(roll: float, pitch: float, yaw: float) -> None:
     assert abs(quaternion @ expected) == pytest.approx(1.0, abs=1e-14)
     to_euler(quaternion, back)
     np.testing.assert_allclose(back, [roll, pitch, yaw], atol=1e-12)
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-15, 1e-12, 1e-9, 2e-8, 1e-6])
+@pytest.mark.parametrize("end", [math.pi / 2, -math.pi / 2])
+def test_angles_at_the_vertical_are_those_of_the_attitude(end: float, off: float) -> None:
+    """Roll and yaw together give the same attitude back, also where each alone is not defined."""
+    random, found = np.random.default_rng(7), np.zeros(3)
+    for roll, yaw in random.uniform(-math.pi, math.pi, (200, 2)):
+        truth = Rotation.from_euler("ZYX", [yaw, end - math.copysign(off, end), roll])
+        to_euler(truth.as_quat(), found)
+        back = Rotation.from_euler("ZYX", found[::-1])
+        assert (truth.inv() * back).magnitude() < 1e-7
+        assert found[1] == pytest.approx(end, abs=max(2.0 * off, 1e-7))
+        if off < 1e-9:
+            assert found[0] == 0.0
