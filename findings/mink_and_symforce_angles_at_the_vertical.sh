@@ -1,6 +1,6 @@
 #!/bin/sh
 # Roll, pitch and yaw of a pose that looks straight up or down: roll and yaw turn about one axis there, and SciPy 1.17.1 and Pinocchio 4.1.0 (pin) choose a pair whose attitude is the given one. mink 1.3.0
-# (`SO3.as_rpy_radians`) and symforce-sym 0.12.0 (`Rot3.to_yaw_pitch_roll`) divide what is left of rounding: the angles are another attitude, by degrees, and for some poses mink gives NaN.
+# (`SO3.as_rpy_radians`) and symforce-sym 0.12.0 (`Rot3.to_yaw_pitch_roll`) do not: their angles are another attitude, and for some poses mink gives NaN.
 # A camera that looks down, a wrist of an arm and a tail-sitter stand so by design. A millionth of a radian away all four are right.
 # Seen: 338 poses with a pitch of +-90 deg: mink NaN for 64, and up to 170 deg off; symforce up to 160 deg off; SciPy and Pinocchio below 1e-9 deg.
 # Exits with 0 while this is so, else with 1.

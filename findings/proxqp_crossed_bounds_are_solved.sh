@@ -1,6 +1,6 @@
 #!/bin/sh
 # ProxQP of proxsuite 0.8.0: a program whose lower bound lies above its upper bound, as where a controller makes bounds from limits of position and speed that contradict each other, has no
-# solution; ProxQP calls it solved. The residual of the one side counts the other one's, and they cancel: the answer lies between the bounds and breaks both. Constraints that contradict each other
+# solution; ProxQP calls it solved. The answer lies between the bounds and breaks both. Constraints that contradict each other
 # by two rows are not called solved. PIQP 0.7.0 does not call any of them solved.
 # Seen: 1 <= x <= -1 (as a row, as a box): PROXQP_SOLVED, with x = 0; as two rows: PROXQP_MAX_ITER_REACHED. Exits with 0 while this is so, else with 1.
 set -e

@@ -45,12 +45,20 @@ class RobotSurfaces:
 
 
 def missing_meshes(robot: RobotDescription) -> list[str]:
-    """Return a sentence for each link of which a mesh is not there; no mesh is read."""
-    return [
-        _absent(link, mesh)
+    """Return what to say of meshes that are not there: a sentence for one, and one for several; no mesh is read."""
+    absent = [
+        (link, mesh)
         for link, look in robot.looks.items()
         for mesh in look.meshes
         if _path(mesh) is None
+    ]
+    links = list(dict.fromkeys(link for link, _ in absent))
+    if len(absent) < 2:
+        return [_absent(*each) for each in absent]
+    few = ", ".join(links[:3]) + (f" and {len(links) - 3} more" if len(links) > 3 else "")
+    which = f"{len(links)} links ({few}) are" if len(links) > 1 else f"link {few} is"
+    return [
+        f"{which} drawn as collision shapes: {len(absent)} meshes are missing, the first is {absent[0][1].file}"
     ]
 
 

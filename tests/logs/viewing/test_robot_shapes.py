@@ -152,3 +152,20 @@ def test_a_recording_names_the_meshes_that_were_not_there(tmp_path: Path) -> Non
     assert warning.endswith(f"there is no mesh {tmp_path / 'gone' / 'base.stl'}")
     header = read(tmp_path / "solo.rrd").header
     assert header.robot is not None and list(header.robot.looks) == ["base_link"]
+
+
+def test_many_missing_meshes_are_one_sentence() -> None:
+    lost = Appearance(meshes=(Mesh(file="a.obj"), Mesh(file="b.obj")))
+    first, second, *others = (link.name for link in BRUCE.links)
+    one = BRUCE.changed(looks={first: lost})
+    assert missing_meshes(one) == [
+        f"link {first} is drawn as collision shapes: 2 meshes are missing, the first is a.obj"
+    ]
+    every = BRUCE.changed(looks={link.name: lost for link in BRUCE.links})
+    count = len(BRUCE.links)
+    assert missing_meshes(every) == [
+        (
+            f"{count} links ({first}, {second}, {others[0]} and {count - 3} more) are drawn as collision shapes: "
+            f"{2 * count} meshes are missing, the first is a.obj"
+        )
+    ]
