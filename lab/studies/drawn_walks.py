@@ -148,7 +148,7 @@ class Gait:
             )
             rows = np.vstack([jacobian.reshape(-1, n)[:, legs], 1e-4 * np.eye(len(legs))])
             wanted = np.concatenate([error, np.zeros(len(legs))])
-            self.joints[legs] += np.clip(np.linalg.lstsq(rows, wanted)[0], -0.2, 0.2)
+            self.joints[legs] += np.clip(np.linalg.lstsq(rows, wanted, rcond=None)[0], -0.2, 0.2)
 
 
 def _part(name: str) -> str:
