@@ -54,9 +54,8 @@ class NotFiniteError(AloftError):
 def find_not_finite(values: Array, found: Indices) -> None:
     """Set ``found`` to one where a value is not finite."""
     wrong = 0
-    for k in range(
-        values.size
-    ):  # the difference is not zero, but no number; no sum, which could overflow
+    # The difference of such a value from itself is not zero, but no number. A sum of all could overflow.
+    for k in range(values.size):
         wrong |= int(values[k] - values[k] != 0.0)
     if wrong:
         found[0] = 1
