@@ -212,6 +212,7 @@ UNUSED = {
     "aloft.mathematics.banded_system.solve_band": (
         3, np.array([[3.0, 0.5, 0.0], [0.0, 4.0, -0.7], [0.0, 0.0, 2.0]]), np.array([1, 2, 2]), NORMAL(3),
     ),
+    "aloft.mathematics.banded_system.whole_blocks": (13,),
     "aloft.mathematics.banded_system.fill_zeros": (NORMAL(3),),
     "aloft.mathematics.banded_system.divide": (NORMAL(3), 1.7),
     "aloft.mathematics.banded_system.subtract_product": (NORMAL(3), 0.3, NORMAL(3)),
@@ -504,6 +505,9 @@ UNUSED |= {
     for each in vars(numpy_numbers).values()
     if is_kernel(each) and each.__module__ == numpy_numbers.__name__
 }
+UNUSED["aloft.runtime.running.finite.find_not_finite"] = (
+    np.array([0.1, 5.0, -2.0]), np.zeros(1, np.int64),
+)  # fmt: skip
 UNUSED["aloft.hal.simulated.physics_step.begin_flight_step"] = (
     np.zeros(1), JointResistance(np.array([0.1, 0.2]), np.array([0.3, 0.4])),
     JointResistance(np.zeros(2), np.zeros(2)), np.zeros(1, np.int64), np.ones(1, np.int64),
