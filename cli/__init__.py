@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import typer
 
-__all__ = ["main", "make_app", "run"]
+__all__ = ["main", "make_app", "run_arguments"]
 
 COLLECTED_AFTER = (400_000, 5, 5)
 """Numbers of objects after which Python looks for garbage among new ones, and of such passes among
@@ -27,7 +27,7 @@ and functions that a start makes and that all stay. A check of a jump makes 100 
 def main() -> None:
     """Run the command line and end the process with one of ``ExitCode``."""
     try:
-        run()
+        run_arguments()
     except SystemExit as end:
         _end_at_once(end.code)
         raise
@@ -49,7 +49,7 @@ def _end_at_once(code: object) -> None:
     os._exit(code or 0)
 
 
-def run() -> None:
+def run_arguments() -> None:
     """Run the command line.
 
     Raises:

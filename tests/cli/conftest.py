@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from aloft.cli import run
+from aloft.cli import run_arguments
 
 from ..counting import copy_counting
 
@@ -54,7 +54,7 @@ def outcome(*arguments: str, columns: int = 160) -> subprocess.CompletedProcess[
     ):
         patch.setattr(sys, "argv", ["aloft", *arguments])
         patch.setenv("COLUMNS", str(columns))
-        run()
+        run_arguments()
     assert isinstance(left.value.code, int)
     return subprocess.CompletedProcess(
         arguments, left.value.code, output.getvalue(), errors.getvalue()

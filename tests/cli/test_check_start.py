@@ -14,10 +14,10 @@ CODE = """
 import gc, json, sys
 found = []
 sys.argv = ["aloft", "check", "--json", GRAPH]
-from aloft.cli import run
+from aloft.cli import run_arguments
 gc.callbacks.append(lambda phase, about: found.append(phase))
 try:
-    run()
+    run_arguments()
 except SystemExit as left:
     print(json.dumps({"code": left.code, "modules": sorted(sys.modules), "collections": len(found)}))
 """

@@ -301,8 +301,8 @@ def test_pydantic_asks_its_loader_of_plugins_for_nothing_else() -> None:
 def test_a_verb_imports_no_other_verbs_file() -> None:
     code = (
         "import sys; sys.argv = ['aloft', 'check', 'nothing.yaml']\n"
-        "from aloft.cli import run\n"
-        "try: run()\n"
+        "from aloft.cli import run_arguments\n"
+        "try: run_arguments()\n"
         "except SystemExit: pass\n"
         "print(sorted(m for m in sys.modules if m in ('aloft.cli.run', 'aloft.cli.plan')))"
     )

@@ -186,13 +186,15 @@ class TsidProgram:
             np.hstack((np.zeros(3), gains.torso_stiffness)),
             np.hstack((np.zeros(3), gains.torso_damping)), local=True,
         )  # fmt: skip
-        place, spin = np.zeros(12), np.zeros(6)
+        place, spin, change = np.zeros(12), np.zeros(6), np.zeros(6)
 
         def show_torso() -> None:
             place[3:] = pin.Quaternion(target.orientation).matrix().T.reshape(-1)
             spin[3:] = block.terms.base_rotation @ target.angular_velocity
+            change[3:] = block.terms.base_rotation @ target.angular_acceleration
             attitude.value(place)
             attitude.derivative(spin)
+            attitude.second_derivative(gains.torso_feedforward * change)
             turn.setReference(attitude)
 
         momentum, wanted = known.momentum(gains.angular_weight, gains.angular_damping)
@@ -398,7 +400,7 @@ class TsidCheck:
     For that TSID's model gets the mass and the centre of mass of the moment, and a weight of the base's
     acceleration; the own method's model loses the inertia of coupled rotors, and its limits on torque. What is
     left of the differences is one weight for each task, so the thrust is left out, and states in which
-    friction binds a point: there the torques differ by more (0.11 N m in a squat), which is not explained.
+    friction binds a point: there the torques differ by more (0.09 N m at the end of a squat), which is not explained.
 
     Attributes:
         errors: the largest difference of a torque in every state that was compared [N m].
