@@ -338,6 +338,12 @@ def to_euler(quaternion: Array1D, out: Array1D) -> None:
         out[2] = atan2(side, front)
 
 
+def cross_products(one: Array, other: Array) -> Array:
+    """Cross products of vectors (..., 3), in a fraction of the time of NumPy's."""
+    (ax, ay, az), (bx, by, bz) = (tuple(each[..., k] for k in range(3)) for each in (one, other))
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
 def axis_rotations(axis: Sequence[float], angles: Array) -> Array:
     """Rotation matrices (n, 3, 3) about a unit axis by ``angles`` [rad] (n,), all at once."""
     x, y, z = axis

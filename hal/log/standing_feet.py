@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...mathematics.arrays import Array, Flags1D, Flags2D
+from ...mathematics.rotations import axis_rotations, cross_products
+from ...robots.limb import chain_to
 from ...robots.robot_description import RobotDescription
-from .turns import rotation_of
 
 RATE, SPEED, TILT, HEIGHT = 0.1, 0.05, 0.06, 0.02
 """Motion of a standing foot of a real leg, with its encoders' offsets: rad/s, m/s, rad and m."""
@@ -49,7 +50,7 @@ class StandingFeet:
 
     def __init__(self, robot: RobotDescription, motion: LoggedMotion) -> None:
         self.robot = robot
-        self.chains = [_chain(robot, foot.link) for foot in robot.feet]
+        self.chains = [chain_to(robot, foot.link) for foot in robot.feet]
         self.joints = sorted({j for chain in self.chains for j in chain})
         """Indices of the joints that carry feet."""
         alone = motion.rate is not None or motion.up is not None
@@ -85,7 +86,7 @@ class StandingFeet:
             if self.rate is not None:
                 yield rate + self.rate, RATE, stands
                 if self.speed is not None:
-                    yield speed + self.speed + _cross(self.rate, place), SPEED, stands
+                    yield speed + self.speed + cross_products(self.rate, place), SPEED, stands
             if self.up is not None:
                 yield normal - self.up, TILT, stands
             for g in range(f):
@@ -98,7 +99,7 @@ class StandingFeet:
                 if self.up is None:
                     yield normal - level, TILT, both
                 apart = place - other
-                yield speed - moving + _cross(base, apart), SPEED, both
+                yield speed - moving + cross_products(base, apart), SPEED, both
                 yield np.einsum("ni,ni->n", apart, up), HEIGHT, both
 
     def _foot(self, foot: int, columns: tuple[int, ...]) -> tuple[Array, ...]:
@@ -113,17 +114,17 @@ class StandingFeet:
         for j, column in zip(self.chains[foot], columns, strict=True):
             joint = self.robot.joints[j]
             arm = turn @ np.array(joint.origin)
-            place, moving = place + arm, moving + _cross(rate, arm)
+            place, moving = place + arm, moving + cross_products(rate, arm)
             axis = turn @ np.array(joint.axis)
             speed = self.velocity[:, column, None]
             if joint.kind == "slide":
                 arm = axis * self.position[:, column, None]
-                place, moving = place + arm, moving + _cross(rate, arm) + axis * speed
+                place, moving = place + arm, moving + cross_products(rate, arm) + axis * speed
             else:
                 rate = rate + axis * speed
                 turn = turn @ self._turn(j, column)  # frames of links are parallel at zero
         arm = turn @ np.array(self.robot.feet[foot].sole)
-        found = place + arm, turn @ self._normals[foot], rate, moving + _cross(rate, arm)
+        found = place + arm, turn @ self._normals[foot], rate, moving + cross_products(rate, arm)
         if len(self._feet) > MOST_KEPT:
             self._feet.clear()
         self._feet[foot, columns] = found
@@ -140,34 +141,11 @@ class StandingFeet:
             axis = np.array(joint.axis)
             axes.append(turn @ axis)
             if joint.kind != "slide":
-                turn = turn @ _turned(axis, self.robot.standing_position[j : j + 1])[0]
+                turn = turn @ axis_rotations(joint.axis, self.robot.standing_position[j : j + 1])[0]
         return turn, axes
 
     def _turn(self, j: int, column: int) -> Array:
         if (j, column) not in self._turned:
-            axis = np.array(self.robot.joints[j].axis)
-            self._turned[j, column] = _turned(axis, self.position[:, column])
+            axis = self.robot.joints[j].axis
+            self._turned[j, column] = axis_rotations(axis, self.position[:, column])
         return self._turned[j, column]
-
-
-def _cross(one: Array, other: Array) -> Array:
-    """Return cross products (n, 3), in a fifth of the time of NumPy's."""
-    x, y, z = one.T
-    a, b, c = other.T
-    return np.stack([y * c - z * b, z * a - x * c, x * b - y * a], axis=1)
-
-
-def _turned(axis: Array, angle: Array) -> Array:
-    """Return the rotations by angles (n,) [rad] about an axis, (n, 3, 3)."""
-    half = 0.5 * angle[:, None]
-    return rotation_of(np.hstack([axis * np.sin(half), np.cos(half)]))
-
-
-def _chain(robot: RobotDescription, link: str) -> list[int]:
-    """Return the joints from the base to a link."""
-    above = {joint.child: j for j, joint in enumerate(robot.joints)}
-    found: list[int] = []
-    while link in above:
-        found.append(above[link])
-        link = robot.joints[above[link]].parent
-    return found[::-1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...mathematics.arrays import Array
+from ...mathematics.rotations import matrices_of_quaternions
 from .log_file import LogError
 
 
@@ -36,14 +37,8 @@ def quaternion_of_rpy(angles: Array) -> Array:
 
 
 def rotation_of(four: Array) -> Array:
-    """Return rotation matrices (n, 3, 3) of quaternions x, y, z, w (n, 4)."""
-    x, y, z, w = (four / np.linalg.norm(four, axis=1, keepdims=True)).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
+    """Return rotation matrices (n, 3, 3) of quaternions x, y, z, w (n, 4) of any norm."""
+    return matrices_of_quaternions(four / np.linalg.norm(four, axis=1, keepdims=True))
 
 
 def rotation_of_rpy(angles: Array) -> Array:

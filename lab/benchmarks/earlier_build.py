@@ -7,7 +7,8 @@ import os
 import subprocess
 import tarfile
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from ...runtime.language.errors import AloftError
@@ -60,3 +61,20 @@ class Build:
     def close(self) -> None:
         """Remove the folder."""
         self._temporary.cleanup()
+
+
+@contextmanager
+def builds_beside(since: str) -> Iterator[list[Build]]:
+    """Open this build and, if one is named, an earlier one, in this order.
+
+    Raises:
+        AloftError: there is no such build.
+    """
+    builds = [Build(ROOT)]
+    try:
+        if since:
+            builds.append(Build(since))
+        yield builds
+    finally:
+        for build in builds:
+            build.close()

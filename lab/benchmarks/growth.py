@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
-from .earlier_build import ROOT, Build
+from .earlier_build import Build, builds_beside
 from .rows import Row
 from .speed import CHAIN, PLANS, run_process
 
@@ -137,14 +137,8 @@ def growth(since: str = "", curves: Sequence[Growth] = CURVES) -> list[Row]:
         AloftError: there is no such build.
         AssertionError: a process failed.
     """
-    builds = [Build(ROOT)]
-    try:
-        if since:
-            builds.append(Build(since))
+    with builds_beside(since) as builds:
         return [row for curve in curves for row in _rows(curve, builds, since)]
-    finally:
-        for build in builds:
-            build.close()
 
 
 def _rows(curve: Growth, builds: Sequence[Build], since: str) -> list[Row]:

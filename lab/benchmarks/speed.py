@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .earlier_build import ROOT, Build
+from .earlier_build import ROOT, Build, builds_beside
 from .rows import Row
 
 REGRESSION = 1.05
@@ -217,18 +217,12 @@ def speed(since: str = "", everything: bool = False) -> list[Row]:
         AloftError: there is no such build.
         AssertionError: a process failed.
     """
-    builds = [Build(ROOT)]
-    try:
-        if since:
-            builds.append(Build(since))
+    with builds_beside(since) as builds:
         rows: list[Row] = []
         for case in CASES:
             if everything or not case.long:
                 rows += _rows(case, builds, since)
         return [*rows, *mujoco_alone(), *_first_runs(builds[0])]
-    finally:
-        for build in builds:
-            build.close()
 
 
 def _rows(case: Case, builds: Sequence[Build], since: str) -> list[Row]:

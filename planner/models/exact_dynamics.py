@@ -19,7 +19,7 @@ from ...mathematics.arrays import Array
 from ...mathematics.compiling.compile_calls import compile_calls
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
-from ...mathematics.rotations import matrices_of_quaternions, skew
+from ...mathematics.rotations import cross_products, matrices_of_quaternions, skew
 from ...mathematics.whole_body_motion import (
     FixedPoints,
     GivenMotion,
@@ -35,7 +35,7 @@ from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses, ball_feet, body_tree
 from ...robots.pinocchio_model import build_pinocchio_model
 from ..task.scaling import per_robot
-from .euler_angles import cross, times, times_transposed
+from .euler_angles import times, times_transposed
 
 WHOLE = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]
 """Places of the parts xx, yy, zz, xy, xz, yz of an inertia in its matrix."""
@@ -261,7 +261,7 @@ class ExactDynamics:
             places[:, ball.foot] = points[:, ball.point]
             # The lowest point moves as the centre does, which is above the sole at the zero pose.
             turn = rates[:, ball.foot, 3:]
-            rates[:, ball.foot, :3] += ball.radius * cross(turn, up[:, ball.foot])
+            rates[:, ball.foot, :3] += ball.radius * cross_products(turn, up[:, ball.foot])
         return FeetStates(
             com, linear / self.mass, angular, points, places, rates[:, :, :3], yaw, pitch
         )
@@ -406,9 +406,9 @@ class ExactDynamics:
         turn = matrices_of_quaternions(position[:, 3:7])
         missed = acceleration[:, :6] - terms.base
         com = times_transposed(turn, terms.com - position[:, :3])
-        pull = self.mass * (missed[:, :3] + cross(missed[:, 3:], com))
+        pull = self.mass * (missed[:, :3] + cross_products(missed[:, 3:], com))
         moment = times(terms.inertia[:, WHOLE], times(turn, missed[:, 3:]))
-        return np.hstack([pull, times_transposed(turn, moment) + cross(com, pull)])
+        return np.hstack([pull, times_transposed(turn, moment) + cross_products(com, pull)])
 
     def joint_torque(self, q: Array, v: Array, joints: Array, force: Array) -> Array:
         """Return the torques [N m] of one instant, (n_joints,), without friction."""
@@ -503,7 +503,7 @@ class ExactDynamics:
         over = np.cumsum(steps)
         time = (over - np.concatenate([[0.0], over])[first[of_step]])[:, None]
         fall = force.sum(axis=1) / self.mass - np.array([0.0, 0.0, GRAVITY])
-        speed = times(turn, twist[:, :3] + cross(twist[:, 3:], com) + rate)
+        speed = times(turn, twist[:, :3] + cross_products(twist[:, 3:], com) + rate)
         flown = (
             (base[:, :3] + times(turn, com))[of_step]
             + time * speed[of_step]
@@ -512,7 +512,9 @@ class ExactDynamics:
         flying = speed[of_step] + time * fall[of_step]
         turns, com = matrices_of_quaternions(orientation), seen.com[ends]
         spins = times(inverse[ends], times_transposed(turns, turning) - seen.momentum[ends])
-        linear = times_transposed(turns, flying) - cross(spins, com) - seen.com_velocity[ends]
+        linear = (
+            times_transposed(turns, flying) - cross_products(spins, com) - seen.com_velocity[ends]
+        )
         return (
             np.hstack([flown - times(turns, com), orientation, angles[ends]]),
             np.hstack([linear, spins, speeds[ends]]),
