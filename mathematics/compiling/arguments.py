@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .failures import FAILURES, Failure
-from .machine_code import ENTRY, machine_code_of
 
 HEADER = 2
 """The number of words before the arguments."""
@@ -139,12 +138,16 @@ def error_record() -> NDArray[np.int64]:
 @cache
 def _error_words() -> tuple[int, int]:
     """Return the address of the function that reports an error, and that of its record."""
+    from .machine_code import machine_code_of
+
     return machine_code_of(_report_module).address, int(error_record().ctypes.data)
 
 
 def _report_module() -> Any:
     """Make the function that reports an error: it sets it for Python and marks it in the record."""
     from llvmlite import ir
+
+    from .machine_code import ENTRY
 
     word, text = ir.IntType(64), ir.IntType(8).as_pointer()
     module = ir.Module("aloft.report")

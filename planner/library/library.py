@@ -6,7 +6,6 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,7 @@ from ..task.task import JumpTask, JumpTaskError
 
 def shipped_folder() -> Path:
     """Return the folder of the graphs that ship with aloft, with their ``tasks`` and ``plans``."""
-    return Path(str(files(__package__.partition(".planner")[0]) / "graphs"))
+    return Path(__file__).parents[2] / "graphs"
 
 
 def find_task(name: str, *folders: Path) -> Path:
