@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Array1D, Array2D, Array3D, Indices1D, Rows3, Vector3
+from .arrays import Array1D, Array2D, Array3D, Flags2D, Indices1D, Rows3, Vector3
 from .body_dynamics import (
     BodyMotion,
     BodyTree,
@@ -41,6 +41,7 @@ from .body_dynamics import (
 )
 from .constants import GRAVITY
 from .kernel import kernel
+from .linear_algebra import pairwise_sum
 from .rotations import rotate, rotate_back, to_matrix
 
 
@@ -194,6 +195,41 @@ def point_terms(
         for axis in range(3):
             out.ahead[i, k, axis] = motion.rotation[body, axis, 0]
             point[axis] = point[axis] + position[axis]
+
+
+@kernel
+def velocities_at_points(
+    columns: Array3D,
+    moves: Flags2D,
+    points: Array3D,
+    velocity: Array2D,
+    share: Array2D,
+    out: Array3D,
+) -> None:
+    """Compute the velocities of the material at points of bodies at n instants, from the columns of Jacobians.
+
+    Args:
+        columns: (n, n_velocities, 6), linear and angular, of the material at the world's origin.
+        moves: whether a velocity moves the body of a point, (n_points, n_velocities).
+        points: (n, n_points, 3) [m]; ``velocity`` (n, n_velocities).
+        share: scratch, (6, n_velocities).
+        out: (n, n_points, 6), linear [m/s] and angular [rad/s].
+    """
+    for i in range(points.shape[0]):
+        for point in range(points.shape[1]):
+            x, y, z = points[i, point, 0], points[i, point, 1], points[i, point, 2]
+            for k in range(velocity.shape[1]):
+                for axis in range(6):
+                    share[axis, k] = 0.0
+                if moves[point, k]:
+                    speed, column = velocity[i, k], columns[i, k]
+                    p, q, r = column[3], column[4], column[5]
+                    share[0, k] = (column[0] - (y * r - z * q)) * speed
+                    share[1, k] = (column[1] - (z * p - x * r)) * speed
+                    share[2, k] = (column[2] - (x * q - y * p)) * speed
+                    share[3, k], share[4, k], share[5, k] = p * speed, q * speed, r * speed
+            for axis in range(6):
+                out[i, point, axis] = pairwise_sum(share[axis])
 
 
 @kernel

@@ -201,6 +201,9 @@ UNUSED = {
     "aloft.mathematics.segment_distances.segment_gap": tuple(NORMAL((4, 3))),
     "aloft.mathematics.segment_distances.capsule_gaps": (*CAPSULES, *CAPSULES, np.zeros((4, 3))),
     "aloft.mathematics.elementary.hypot": (0.3, -0.4),
+    "aloft.mathematics.linear_algebra.weighted_sum": (np.array([0.3, 0.0, -0.2]), NORMAL((3, 9)), np.ones(9)),
+    "aloft.mathematics.linear_algebra.pairwise_sum": (NORMAL(21),),
+    "aloft.mathematics.linear_algebra.add_multiple": (NORMAL(9), 0.3, NORMAL(9)),
     "aloft.mathematics.banded_system.assemble_normal": (
         CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3), 3,
         np.zeros((3, 8)), *np.zeros((2, 3), dtype=np.int64), np.zeros(3),
@@ -253,6 +256,10 @@ UNUSED = {
     ),
     "aloft.mathematics.whole_body_motion.evaluate_motion": (
         TREE, SOLES_OF_TREE, AT_TWO, motion_memory(10), EVALUATED,
+    ),
+    "aloft.mathematics.whole_body_motion.velocities_at_points": (
+        NORMAL((2, 10, 6)), np.arange(30).reshape(3, 10) % 3 > 0, NORMAL((2, 3, 3)), NORMAL((2, 10)),
+        np.zeros((6, 10)), np.zeros((2, 3, 6)),
     ),
     "aloft.mathematics.whole_body_motion.set_poses_at_instants": (
         TREE, AT_TWO.position, body_motion(10), np.zeros((2, 11, 3)), np.zeros((2, 11, 9)),

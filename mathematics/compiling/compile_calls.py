@@ -10,12 +10,12 @@ from functools import partial
 from typing import Any
 
 from ...processes.child_process import ChildProcess, processors
-from ..kernel import kernels
 from . import shipped, store
 from .arguments import ArgumentType, pack, type_of
 from .failures import CompileError
 from .fingerprint import fingerprint
 from .kernel_call import KernelCall
+from .kernel_registry import kernels
 from .machine_code import MachineCode, optimised, tools
 from .sharing import CompileJob, divide, helpers
 

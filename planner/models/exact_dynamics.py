@@ -30,6 +30,7 @@ from ...mathematics.whole_body_motion import (
     motion_memory,
     set_poses_at_instants,
     turn_memory,
+    velocities_at_points,
 )
 from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses, ball_feet, body_tree
@@ -137,7 +138,9 @@ class ExactDynamics:
         self._calls: dict[object, tuple[KernelCall, GivenMotion, MotionTerms]] = {}
         self._links = (robot.base, *(joint.child for joint in robot.joints))
         self._columns = [self._moving(frame) for frame in built.contact_frames]
-        self._foot_columns = [self._moving(frame) for frame in built.sole_frames]
+        self._foot_moves = np.zeros((len(built.sole_frames), self.model.nv), np.bool_)
+        for moves, frame in zip(self._foot_moves, built.sole_frames, strict=True):
+            moves[self._moving(frame)] = True
 
     def _fixed_points(self, robot: RobotDescription) -> FixedPoints:
         """Return the contact points and behind them the sole centres. Of balls both are the lowest point."""
@@ -230,7 +233,7 @@ class ExactDynamics:
         first, second = (data.oMf[k].rotation.T for k in range(2))
         apart = second.ctypes.data - first.ctypes.data
         read = (
-            data.com[0], data.hg.linear, data.hg.angular, data.oMi[1].rotation[:, 0], data.J,
+            data.com[0], data.hg.linear, data.hg.angular, data.J.T,
             as_strided(first, (len(data.oMf), 4, 3), (apart, 24, 8), writeable=False),
         )  # fmt: skip
         found = [np.empty((count, *each.shape)) for each in read]
@@ -240,20 +243,17 @@ class ExactDynamics:
             pin.updateFramePlacements(model, data)
             for each, now in zip(found, read, strict=True):
                 each[i] = now
-        com, linear, angular, base, columns, frames = found
+        com, linear, angular, columns, frames = found
         contacts, soles = frames[:, self.contact_frames], frames[:, self.sole_frames]
         points, places, up = contacts[:, :, 3], soles[:, :, 3], soles[:, :, 2]
-        yaw, pitch = self._angles(soles[:, :, 0], base)
-        rates = np.empty((count, feet, 6))
-        for foot, moving in enumerate(self._foot_columns):
-            # Of the columns seen from the world's origin those at the sole.
-            jacobian = np.zeros(columns.shape)
-            own = columns[:, :, moving]
-            jacobian[:, 3:, moving] = own[:, 3:]
-            arm = places[:, foot, :, None]
-            lever = arm[:, AFTER] * own[:, [5, 3, 4]] - arm[:, BEFORE] * own[:, [4, 5, 3]]
-            jacobian[:, :3, moving] = own[:, :3] - lever
-            rates[:, foot] = np.add.reduce(jacobian * velocity[:, None, :], axis=-1)
+        # The base's own first axis is the linear part of the column that it moves along.
+        yaw, pitch = self._angles(soles[:, :, 0], columns[:, 0, :3])
+        rates, share = np.empty((count, feet, 6)), np.empty((6, model.nv))
+        run_compiled(
+            KernelCall(
+                velocities_at_points, columns, self._foot_moves, places, velocity, share, rates
+            )
+        )
         for ball in self.balls:
             points[:, ball.point] += ball.radius * (
                 contacts[:, ball.point, 2] - np.array([0.0, 0.0, 1.0])
