@@ -261,6 +261,9 @@ UNUSED = {
         NORMAL((2, 10, 6)), np.arange(30).reshape(3, 10) % 3 > 0, NORMAL((2, 3, 3)), NORMAL((2, 10)),
         np.zeros((6, 10)), np.zeros((2, 3, 6)),
     ),
+    "aloft.mathematics.whole_body_motion.place_points": (
+        NORMAL((4, 3, 3)), NORMAL((4, 3, 9)), np.array([2, 0]), NORMAL((2, 3)), np.zeros((2, 4, 3)),
+    ),
     "aloft.mathematics.whole_body_motion.set_poses_at_instants": (
         TREE, AT_TWO.position, body_motion(10), np.zeros((2, 11, 3)), np.zeros((2, 11, 9)),
     ),
