@@ -16,7 +16,7 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
-from ...mathematics.compiling.compile_calls import compile_calls
+from ...mathematics.compiling.compile_calls import compile_calls, run_compiled
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.constants import GRAVITY
 from ...mathematics.rotations import cross_products, matrices_of_quaternions, skew
@@ -250,9 +250,7 @@ class ExactDynamics:
         yaw, pitch = self._angles(soles[:, :, 0], columns[:, 0, :3])
         rates, share = np.empty((count, feet, 6)), np.empty((6, model.nv))
         run_compiled(
-            KernelCall(
-                velocities_at_points, columns, self._foot_moves, places, velocity, share, rates
-            )
+            velocities_at_points, columns, self._foot_moves, places, velocity, share, rates
         )
         for ball in self.balls:
             points[:, ball.point] += ball.radius * (
@@ -328,9 +326,7 @@ class ExactDynamics:
         place = np.zeros((len(position), len(self._links), 3))
         rotation = np.zeros((*place.shape[:2], 9))
         run_compiled(
-            KernelCall(
-                set_poses_at_instants, self._tree, np.ascontiguousarray(position), self._memory.motion, place, rotation,
-            )
+            set_poses_at_instants, self._tree, np.ascontiguousarray(position), self._memory.motion, place, rotation,
         )  # fmt: skip
         return LinkPoses(self._links, place, rotation.reshape(*place.shape, 3))
 
@@ -498,7 +494,7 @@ class ExactDynamics:
             inverse, times(inverse, seen.momentum), np.ascontiguousarray(lever), steps, first,
             base[:, 3:7].copy(), momentum, moment,
         )  # fmt: skip
-        run_compiled(KernelCall(follow_turns, pushed, turn_memory(), orientation, turning))
+        run_compiled(follow_turns, pushed, turn_memory(), orientation, turning)
         # The centre of mass flies a parabola; the base follows from it.
         over = np.cumsum(steps)
         time = (over - np.concatenate([[0.0], over])[first[of_step]])[:, None]
@@ -519,12 +515,6 @@ class ExactDynamics:
             np.hstack([flown - times(turns, com), orientation, angles[ends]]),
             np.hstack([linear, spins, speeds[ends]]),
         )
-
-
-def run_compiled(call: KernelCall) -> None:
-    """Make a call as machine code where that can be."""
-    compile_calls([call])
-    call.run()
 
 
 @per_robot

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.compiling.compile_calls import run_compiled
 from ...mathematics.rotations import matrices_of_quaternions
 from ...mathematics.segment_distances import capsule_gaps
 from ...mathematics.whole_body_motion import place_points
@@ -21,7 +21,6 @@ from ...robots.limb import chain_to
 from ...robots.shapes import convex, edges
 from ...robots.surfaces import quaternion_from_z
 from ..task.scaling import per_robot
-from .exact_dynamics import run_compiled
 
 FAR = 0.1
 """m; shapes that are known to be that far apart are not measured exactly."""
@@ -52,11 +51,10 @@ def moving_shapes(robot: RobotDescription, poses: LinkPoses) -> dict[str, list[M
     links, corners = _corners(robot)
     count = len(poses.position)
     places = np.empty((len(links), count, 3))
-    call = KernelCall(
+    run_compiled(
         place_points, poses.position, poses.rotation.reshape(count, -1, 9),
         np.array([poses.names.index(link) for link in links], dtype=np.int64), corners, places,
     )  # fmt: skip
-    run_compiled(call)
     found, first = dict[str, list[MovingShape]](), 0
     for link in robot.links:
         found[link.name] = []
@@ -107,7 +105,7 @@ def gaps_between(some: Sequence[MovingShape], others: Sequence[MovingShape]) -> 
         ends = [np.stack([each.corners for each in group]) for group in (some, others)]
         radii = [np.array([each.shape.radius for each in group]) for group in (some, others)]
         parts = [(whole[:, 0], whole[:, 1], r) for whole, r in zip(ends, radii, strict=True)]
-        run_compiled(KernelCall(capsule_gaps, *parts[0], *parts[1], gaps))
+        run_compiled(capsule_gaps, *parts[0], *parts[1], gaps)
         return gaps
     for row, (one, other) in zip(gaps, product(some, others), strict=True):
         _fill_gaps(one, other, row)
