@@ -6,10 +6,12 @@ position, pitch, roll, yaw and joints: ``ORDER`` leads from one order of the ang
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...mathematics.compiling.compile_calls import run_compiled
+from ...mathematics.compiling.row_call import RowCall
 from ...mathematics.euler_motion import motions_in_body, motions_in_world
 from ...mathematics.rotations import matrices_of_quaternions
 
@@ -89,24 +91,43 @@ def twist_of(q: Array, v: Array, bend: Array) -> tuple[Array, Array]:
     """Return the robot's velocities and accelerations, with the base's part in the body frame, of the planner's
     coordinates, their rates and accelerations, all (..., n_velocities).
     """
-    rows = [each.reshape(-1, each.shape[-1]) for each in (q, v, bend)]
-    angles, velocity, acceleration = (
-        rows[0][:, 3:6],
-        np.empty(rows[1].shape),
-        np.empty(rows[1].shape),
-    )
-    run_compiled(
-        motions_in_body, np.sin(angles), np.cos(angles), *rows[1:], np.empty((3, 3)), velocity, acceleration
+    size = v.shape[-1]
+    angles = q.reshape(-1, size)[:, 3:6]
+    call = _in_body(size)
+    sine, cosine, rate, change, _, velocity, acceleration = call.rows(len(angles))
+    np.sin(angles, out=sine)
+    np.cos(angles, out=cosine)
+    rate[:], change[:] = v.reshape(-1, size), bend.reshape(-1, size)
+    call.run()
+    return velocity.reshape(v.shape).copy(), acceleration.reshape(v.shape).copy()
+
+
+@cache
+def _in_body(size: int) -> RowCall:
+    """Return the call of ``motions_in_body`` for so many coordinates."""
+    return RowCall(
+        motions_in_body,
+        lambda n: (*np.zeros((2, n, 3)), *np.zeros((2, n, size)), np.zeros((3, 3)), *np.zeros((2, n, size))),
     )  # fmt: skip
-    return velocity.reshape(v.shape), acceleration.reshape(v.shape)
 
 
 def coordinates_of(position: Array, velocity: Array) -> tuple[Array, Array]:
     """Return the planner's coordinates and their rates, both (n, n_velocities), of a motion: ``position`` (n,
     n_positions) and ``velocity`` (n, n_velocities) as ``pose_of`` and ``twist_of`` give them.
     """
-    angles, rates = euler_angles(position[:, 3:7])[:, ORDER], np.empty(velocity.shape)
-    run_compiled(
-        motions_in_world, np.sin(angles), np.cos(angles), velocity, np.empty((3, 3)), rates
-    )
-    return np.hstack([position[:, :3], angles, position[:, 7:]]), rates
+    angles, call = euler_angles(position[:, 3:7])[:, ORDER], _in_world(velocity.shape[1])
+    sine, cosine, given, _, rates = call.rows(len(angles))
+    np.sin(angles, out=sine)
+    np.cos(angles, out=cosine)
+    given[:] = velocity
+    call.run()
+    return np.hstack([position[:, :3], angles, position[:, 7:]]), rates.copy()
+
+
+@cache
+def _in_world(size: int) -> RowCall:
+    """Return the call of ``motions_in_world`` for so many coordinates."""
+    return RowCall(
+        motions_in_world,
+        lambda n: (*np.zeros((2, n, 3)), np.zeros((n, size)), np.zeros((3, 3)), np.zeros((n, size))),
+    )  # fmt: skip
