@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...mathematics.compiling.row_call import RowCall
+from ...mathematics.compiling.kernel_on_rows import KernelOnRows
 from ...mathematics.euler_motion import motions_in_body, motions_in_world
 from ...mathematics.rotations import matrices_of_quaternions
 
@@ -103,9 +103,9 @@ def twist_of(q: Array, v: Array, bend: Array) -> tuple[Array, Array]:
 
 
 @cache
-def _in_body(size: int) -> RowCall:
+def _in_body(size: int) -> KernelOnRows:
     """Return the call of ``motions_in_body`` for so many coordinates."""
-    return RowCall(
+    return KernelOnRows(
         motions_in_body,
         lambda n: (*np.zeros((2, n, 3)), *np.zeros((2, n, size)), np.zeros((3, 3)), *np.zeros((2, n, size))),
     )  # fmt: skip
@@ -125,9 +125,9 @@ def coordinates_of(position: Array, velocity: Array) -> tuple[Array, Array]:
 
 
 @cache
-def _in_world(size: int) -> RowCall:
+def _in_world(size: int) -> KernelOnRows:
     """Return the call of ``motions_in_world`` for so many coordinates."""
-    return RowCall(
+    return KernelOnRows(
         motions_in_world,
         lambda n: (*np.zeros((2, n, 3)), np.zeros((n, size)), np.zeros((3, 3)), np.zeros((n, size))),
     )  # fmt: skip

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
 from ...mathematics.body_dynamics import body_motion
-from ...mathematics.compiling.row_call import RowCall
+from ...mathematics.compiling.kernel_on_rows import KernelOnRows
 from ...mathematics.constants import GRAVITY
 from ...mathematics.rotations import cross_products, matrices_of_quaternions, skew
 from ...mathematics.whole_body_motion import (
@@ -134,10 +134,10 @@ class ExactDynamics:
         self._tree = body_tree(robot)
         self._fixed = self._fixed_points(robot)
         self._centres = self._fixed._replace(below=np.zeros_like(self._fixed.below))
-        self._evaluations: dict[tuple[bool, int], RowCall] = {}
-        self._poses = RowCall(set_poses_at_instants, self._of_poses)
-        self._turns = RowCall(follow_turns, _of_turns)
-        self._speeds = RowCall(velocities_at_points, self._of_speeds)
+        self._evaluations: dict[tuple[bool, int], KernelOnRows] = {}
+        self._poses = KernelOnRows(set_poses_at_instants, self._of_poses)
+        self._turns = KernelOnRows(follow_turns, _of_turns)
+        self._speeds = KernelOnRows(velocities_at_points, self._of_speeds)
         self._links = (robot.base, *(joint.child for joint in robot.joints))
         self._columns = [self._moving(frame) for frame in built.contact_frames]
         self._foot_moves = np.zeros((len(built.sole_frames), self.model.nv), np.bool_)
@@ -353,7 +353,7 @@ class ExactDynamics:
         key = fixed is self._fixed, 0 if force is None else force.shape[1]
         if key not in self._evaluations:
             make = partial(self._of_motion, fixed, key[1])
-            self._evaluations[key] = RowCall(evaluate_motion, make)
+            self._evaluations[key] = KernelOnRows(evaluate_motion, make)
         call = self._evaluations[key]
         _, _, given, _, terms = call.rows(len(position))
         given.position[:], given.velocity[:] = position, velocity

@@ -19,12 +19,12 @@ LEAST = 64
 """The number of rows for which there is memory at first."""
 
 
-class RowCall(threading.local):
+class KernelOnRows(threading.local):
     """A call of a kernel on the first rows of arrays; each thread has memory of its own.
 
     ::
 
-        call = RowCall(kernel, lambda count: (tree, np.zeros((count, 3)), np.zeros((count, 7))))
+        call = KernelOnRows(kernel, lambda count: (tree, np.zeros((count, 3)), np.zeros((count, 7))))
         tree, position, out = call.rows(20)
         position[:] = ...
         call.run()

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from aloft.mathematics.arrays import Array, Array1D, Array2D
-from aloft.mathematics.compiling import row_call
-from aloft.mathematics.compiling.row_call import LEAST, RowCall
+from aloft.mathematics.compiling import kernel_on_rows
+from aloft.mathematics.compiling.kernel_on_rows import LEAST, KernelOnRows
 from aloft.mathematics.kernel import kernel
 
 
@@ -40,7 +40,7 @@ def make(count: int, stretches: int) -> tuple[Any, ...]:
 FIXED = np.array([0.5])
 
 
-def check(call: RowCall, count: int, stretches: int) -> None:
+def check(call: KernelOnRows, count: int, stretches: int) -> None:
     rng = np.random.default_rng(count)
     _, rows, starts, fixed, out = call.rows(count, stretches)
     assert rows.shape == (count, 3) and starts.shape == out.ends.shape == (stretches + 1,)
@@ -54,15 +54,15 @@ def check(call: RowCall, count: int, stretches: int) -> None:
 @pytest.mark.parametrize("compiled", [True, False])
 def test_rows_of_any_number(compiled: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     if not compiled:
-        monkeypatch.setattr(row_call, "compile_calls", lambda calls: "none of them")
-    call = RowCall(add_rows, make)
+        monkeypatch.setattr(kernel_on_rows, "compile_calls", lambda calls: "none of them")
+    call = KernelOnRows(add_rows, make)
     for count, stretches in ((5, 1), (3, 2), (0, 0), (LEAST + 1, 2), (7, LEAST + 5), (7, 2)):
         check(call, count, stretches)
         check(call, count, stretches)
 
 
 def test_what_is_behind_the_rows_stays() -> None:
-    call = RowCall(add_rows, make)
+    call = KernelOnRows(add_rows, make)
     longer = call.rows(9, 3)[-1]
     longer.sums[:], longer.ends[:] = 7.0, 7.0
     check(call, 4, 1)
@@ -70,7 +70,7 @@ def test_what_is_behind_the_rows_stays() -> None:
 
 
 def test_each_thread_has_its_own_rows() -> None:
-    call, found = RowCall(add_rows, make), list[Array]()
+    call, found = KernelOnRows(add_rows, make), list[Array]()
 
     def other() -> None:
         check(call, 6, 1)
@@ -87,4 +87,4 @@ def test_rows_come_before_the_call() -> None:
     with pytest.raises(
         ValueError, match=r"rows\(\) must tell how many rows there are before run\(\)"
     ):
-        RowCall(add_rows, make).run()
+        KernelOnRows(add_rows, make).run()
