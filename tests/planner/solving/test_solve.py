@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from aloft.mathematics.rotations import matrices_of_quaternions
-from aloft.planner.checking.validity import InvalidPlanError, check_plan, checked
+from aloft.planner.checking.validity import check_plan, checked
 from aloft.planner.library.library import SHIPPED, PlanLibrary, solve_and_check
 from aloft.planner.problem.guess import ballistic_guess
 from aloft.planner.problem.unpacking import can_start
@@ -34,7 +34,7 @@ from aloft.planner.solving.solve import (
 )
 from aloft.planner.solving.solver import solve
 from aloft.planner.task.files import PlanError
-from aloft.planner.task.plan import ARRAYS, PlannedJump
+from aloft.planner.task.plan import ARRAYS, InvalidPlanError, PlannedJump
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
