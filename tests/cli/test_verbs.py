@@ -281,6 +281,23 @@ atexit.register(lambda: print(len(searched), gc.get_freeze_count(), *sys.modules
     }  # fmt: skip
 
 
+def test_an_unrecorded_run_imports_no_recorder(start: Start) -> None:
+    # Nor links between processes, nor what checks a plan that has passed or makes a table that is kept.
+    graph, before = (
+        str(ROOT / "graphs" / "jump.yaml"),
+        "import atexit, sys\natexit.register(lambda: print(*sys.modules))\n",
+    )
+    arguments = ("run", graph, "--no-record", "--json", "--duration", "10 ms")
+    for _ in range(2):  # after the first, all is kept
+        output, errors = start(*arguments, before=before).communicate(timeout=240)
+    modules = {*output.splitlines()[-1].split()}
+    assert "aloft.runtime.running.executor" in modules, errors
+    assert {
+        "aloft.logs", "aloft.runtime.links", "aloft.runtime.transports", "aloft.planner.checking", "aloft.planner.models",
+        "aloft.planner.library.reference_table", "html", "concurrent.futures", "rerun",
+    } & modules == set()  # fmt: skip
+
+
 def test_a_bug_does_not_look_like_a_fall(
     folder: Path, monkeypatch: pytest.MonkeyPatch, call: Call, call_json: CallJson
 ) -> None:
