@@ -134,6 +134,21 @@ def set_poses_at_instants(
 
 
 @kernel
+def place_points(
+    place: Array3D, rotation: Array3D, body: Indices1D, point: Rows3, out: Array3D
+) -> None:
+    """Compute where points (n_points, 3) of bodies are at n instants, (n_points, n, 3), from poses as
+    ``set_poses_at_instants`` gives them."""
+    for k in range(body.shape[0]):
+        x, y, z = point[k, 0], point[k, 1], point[k, 2]
+        for i in range(place.shape[0]):
+            turn = rotation[i, body[k]]
+            for row in range(3):
+                turned = turn[3 * row] * x + turn[3 * row + 1] * y + turn[3 * row + 2] * z
+                out[k, i, row] = place[i, body[k], row] + turned
+
+
+@kernel
 def set_poses_and_velocities(
     tree: BodyTree, position: Array1D, velocity: Array1D, bend: Array1D, memory: MotionMemory
 ) -> None:

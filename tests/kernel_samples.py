@@ -201,6 +201,14 @@ UNUSED = {
     "aloft.mathematics.segment_distances.segment_gap": tuple(NORMAL((4, 3))),
     "aloft.mathematics.segment_distances.capsule_gaps": (*CAPSULES, *CAPSULES, np.zeros((4, 3))),
     "aloft.mathematics.elementary.hypot": (0.3, -0.4),
+    "aloft.mathematics.euler_motion.euler_matrix": (*NORMAL((2, 3)), np.zeros((3, 3))),
+    "aloft.mathematics.euler_motion.turn_back": (NORMAL((3, 3)), NORMAL(6), np.zeros(3)),
+    "aloft.mathematics.euler_motion.motions_in_body": (
+        *NORMAL((2, 4, 3)), *NORMAL((2, 4, 9)), np.zeros((3, 3)), *np.zeros((2, 4, 9)),
+    ),
+    "aloft.mathematics.euler_motion.motions_in_world": (
+        *NORMAL((2, 4, 3)), NORMAL((4, 9)), np.zeros((3, 3)), np.zeros((4, 9)),
+    ),
     "aloft.mathematics.linear_algebra.weighted_sum": (np.array([0.3, 0.0, -0.2]), NORMAL((3, 9)), np.ones(9)),
     "aloft.mathematics.linear_algebra.pairwise_sum": (NORMAL(21),),
     "aloft.mathematics.linear_algebra.add_multiple": (NORMAL(9), 0.3, NORMAL(9)),
@@ -260,6 +268,9 @@ UNUSED = {
     "aloft.mathematics.whole_body_motion.velocities_at_points": (
         NORMAL((2, 10, 6)), np.arange(30).reshape(3, 10) % 3 > 0, NORMAL((2, 3, 3)), NORMAL((2, 10)),
         np.zeros((6, 10)), np.zeros((2, 3, 6)),
+    ),
+    "aloft.mathematics.whole_body_motion.place_points": (
+        NORMAL((4, 3, 3)), NORMAL((4, 3, 9)), np.array([2, 0]), NORMAL((2, 3)), np.zeros((2, 4, 3)),
     ),
     "aloft.mathematics.whole_body_motion.set_poses_at_instants": (
         TREE, AT_TWO.position, body_motion(10), np.zeros((2, 11, 3)), np.zeros((2, 11, 9)),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,8 +17,8 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
-from ...mathematics.compiling.compile_calls import compile_calls
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.body_dynamics import body_motion
+from ...mathematics.compiling.kernel_on_rows import KernelOnRows
 from ...mathematics.constants import GRAVITY
 from ...mathematics.rotations import cross_products, matrices_of_quaternions, skew
 from ...mathematics.whole_body_motion import (
@@ -40,8 +41,6 @@ from .euler_angles import times, times_transposed
 
 WHOLE = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]
 """Places of the parts xx, yy, zz, xy, xz, yz of an inertia in its matrix."""
-KEPT_CALLS = 32
-"""Calls whose memory is kept: as many numbers of instants."""
 Motion = tuple[Array, Array, Array]
 """Joint angles, velocities and accelerations."""
 AFTER, BEFORE = [1, 2, 0], [2, 0, 1]
@@ -132,10 +131,13 @@ class ExactDynamics:
         self.mass = robot.total_mass
         self._rotor_coupling = built.rotor_coupling
         self._rotors = robot.rotor_matrix
-        self._tree, self._memory = body_tree(robot), motion_memory(len(robot.joints))
+        self._tree = body_tree(robot)
         self._fixed = self._fixed_points(robot)
         self._centres = self._fixed._replace(below=np.zeros_like(self._fixed.below))
-        self._calls: dict[object, tuple[KernelCall, GivenMotion, MotionTerms]] = {}
+        self._evaluations: dict[tuple[bool, int], KernelOnRows] = {}
+        self._poses = KernelOnRows(set_poses_at_instants, self._of_poses)
+        self._turns = KernelOnRows(follow_turns, _of_turns)
+        self._speeds = KernelOnRows(velocities_at_points, self._of_speeds)
         self._links = (robot.base, *(joint.child for joint in robot.joints))
         self._columns = [self._moving(frame) for frame in built.contact_frames]
         self._foot_moves = np.zeros((len(built.sole_frames), self.model.nv), np.bool_)
@@ -227,7 +229,8 @@ class ExactDynamics:
     def feet(self, position: Array, velocity: Array) -> FeetStates:
         """Return what a reference of the controller holds of n states."""
         pin, model, data = self.pin, self.model, self.data
-        count, feet = len(position), len(self.sole_frames)
+        count = len(position)
+        columns, _, places, speeds, _, rates = self._speeds.rows(count)
         # What Pinocchio computes is written in memory that stays. There the frames follow each other, each with the
         # columns of its rotation and its place.
         first, second = (data.oMf[k].rotation.T for k in range(2))
@@ -236,24 +239,22 @@ class ExactDynamics:
             data.com[0], data.hg.linear, data.hg.angular, data.J.T,
             as_strided(first, (len(data.oMf), 4, 3), (apart, 24, 8), writeable=False),
         )  # fmt: skip
-        found = [np.empty((count, *each.shape)) for each in read]
+        com, linear, angular = np.empty((3, count, 3))
+        frames = np.empty((count, *read[-1].shape))
+        found = com, linear, angular, columns, frames
         for i, (q, v) in enumerate(zip(position, velocity, strict=True)):
             pin.computeCentroidalMomentum(model, data, q, v)
             pin.computeJointJacobians(model, data)
             pin.updateFramePlacements(model, data)
             for each, now in zip(found, read, strict=True):
                 each[i] = now
-        com, linear, angular, columns, frames = found
         contacts, soles = frames[:, self.contact_frames], frames[:, self.sole_frames]
-        points, places, up = contacts[:, :, 3], soles[:, :, 3], soles[:, :, 2]
+        points, up = contacts[:, :, 3], soles[:, :, 2]
+        places[:], speeds[:] = soles[:, :, 3], velocity
         # The base's own first axis is the linear part of the column that it moves along.
         yaw, pitch = self._angles(soles[:, :, 0], columns[:, 0, :3])
-        rates, share = np.empty((count, feet, 6)), np.empty((6, model.nv))
-        run_compiled(
-            KernelCall(
-                velocities_at_points, columns, self._foot_moves, places, velocity, share, rates
-            )
-        )
+        self._speeds.run()
+        places, rates = places.copy(), rates.copy()
         for ball in self.balls:
             points[:, ball.point] += ball.radius * (
                 contacts[:, ball.point, 2] - np.array([0.0, 0.0, 1.0])
@@ -265,6 +266,14 @@ class ExactDynamics:
         return FeetStates(
             com, linear / self.mass, angular, points, places, rates[:, :, :3], yaw, pitch
         )
+
+    def _of_speeds(self, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``velocities_at_points`` for the sole centres."""
+        feet, size = self._foot_moves.shape
+        return (
+            np.zeros((count, size, 6)), self._foot_moves, np.zeros((count, feet, 3)),
+            np.zeros((count, size)), np.zeros((6, size)), np.zeros((count, feet, 6)),
+        )  # fmt: skip
 
     def foot_angles(self) -> tuple[Array, Array]:
         """Return the heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated last. A ball
@@ -325,26 +334,28 @@ class ExactDynamics:
 
     def link_poses(self, position: Array) -> LinkPoses:
         """Return the poses of the links in n states (n, n_positions), the base first."""
-        place = np.zeros((len(position), len(self._links), 3))
-        rotation = np.zeros((*place.shape[:2], 9))
-        run_compiled(
-            KernelCall(
-                set_poses_at_instants, self._tree, np.ascontiguousarray(position), self._memory.motion, place, rotation,
-            )
+        _, given, _, place, rotation = self._poses.rows(len(position))
+        given[:] = position
+        self._poses.run()
+        return LinkPoses(self._links, place.copy(), rotation.reshape(*place.shape, 3).copy())
+
+    def _of_poses(self, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``set_poses_at_instants``."""
+        links = len(self._links)
+        return (
+            self._tree, np.zeros((count, self.model.nq)), body_motion(len(self._rotors)),
+            np.zeros((count, links, 3)), np.zeros((count, links, 9)),
         )  # fmt: skip
-        return LinkPoses(self._links, place, rotation.reshape(*place.shape, 3))
 
     def _evaluate(
         self, fixed: FixedPoints, position: Array, velocity: Array, bend: Array | None, force: Array | None
     ) -> MotionTerms:  # fmt: skip
-        count, joints = len(position), len(self._rotors)
-        pushes = (count, 0, 3) if force is None else force.shape
-        key = fixed is self._fixed, pushes
-        if key not in self._calls:
-            if len(self._calls) >= KEPT_CALLS:
-                self._calls.clear()
-            self._calls[key] = self._evaluation(fixed, joints, pushes)
-        call, given, terms = self._calls[key]
+        key = fixed is self._fixed, 0 if force is None else force.shape[1]
+        if key not in self._evaluations:
+            make = partial(self._of_motion, fixed, key[1])
+            self._evaluations[key] = KernelOnRows(evaluate_motion, make)
+        call = self._evaluations[key]
+        _, _, given, _, terms = call.rows(len(position))
         given.position[:], given.velocity[:] = position, velocity
         given.bend[:] = 0.0 if bend is None else bend
         if force is not None:
@@ -354,23 +365,19 @@ class ExactDynamics:
         found.torque[:] += given.bend @ self._rotors.T
         return found
 
-    def _evaluation(
-        self, fixed: FixedPoints, joints: int, pushes: tuple[int, ...]
-    ) -> tuple[KernelCall, GivenMotion, MotionTerms]:
-        """Return the call for so many instants, with its memory: to make a call takes longer than to run it."""
-        count, points = pushes[0], (len(fixed.body), 3)
+    def _of_motion(self, fixed: FixedPoints, pushed: int, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``evaluate_motion`` with forces on so many points."""
+        joints, points = len(self._rotors), (len(fixed.body), 3)
         shapes = (
             (count, 3), (count, 3), (count, 3), (count, 6), (count, *points), (count, *points),
             (count, *points), (count, 6), (count, joints),
         )  # fmt: skip
         given = GivenMotion(
             np.zeros((count, 7 + joints)), np.zeros((count, 6 + joints)), np.zeros((count, joints)),
-            np.zeros(pushes),
+            np.zeros((count, pushed, 3)),
         )  # fmt: skip
         terms = MotionTerms(*(np.zeros(shape) for shape in shapes))
-        call = KernelCall(evaluate_motion, self._tree, fixed, given, self._memory, terms)
-        compile_calls([call])
-        return call, given, terms
+        return self._tree, fixed, given, motion_memory(joints), terms
 
     def standing_inertia(self, joints: Array) -> tuple[Array, Array]:
         """Return the centre of mass [m] (3,) and the inertia about it [kg m^2] (3, 3) of a robot with those joint
@@ -493,12 +500,14 @@ class ExactDynamics:
             moment[:, 1] -= ball.radius * force[:, ball.point, 0]
         com, rate, carried = seen.com[starts], seen.com_velocity[starts], seen.momentum[starts]
         momentum = times(turn, times(inertia[starts], twist[:, 3:]) + carried)
-        orientation, turning = np.empty((len(steps), 4)), np.empty((len(steps), 3))
-        pushed = PushedTurns(
-            inverse, times(inverse, seen.momentum), np.ascontiguousarray(lever), steps, first,
-            base[:, 3:7].copy(), momentum, moment,
+        pushed, _, *turned = self._turns.rows(len(angles), len(steps), len(counts))
+        given = (
+            inverse, times(inverse, seen.momentum), lever, steps, first, base[:, 3:7], momentum, moment
         )  # fmt: skip
-        run_compiled(KernelCall(follow_turns, pushed, turn_memory(), orientation, turning))
+        for own, values in zip(pushed, given, strict=True):
+            own[:] = values
+        self._turns.run()
+        orientation, turning = (each.copy() for each in turned)
         # The centre of mass flies a parabola; the base follows from it.
         over = np.cumsum(steps)
         time = (over - np.concatenate([[0.0], over])[first[of_step]])[:, None]
@@ -521,10 +530,13 @@ class ExactDynamics:
         )
 
 
-def run_compiled(call: KernelCall) -> None:
-    """Make a call as machine code where that can be."""
-    compile_calls([call])
-    call.run()
+def _of_turns(instants: int, steps: int, count: int) -> tuple[Any, ...]:
+    """Return the arguments of ``follow_turns``."""
+    pushed = PushedTurns(
+        np.zeros((instants, 3, 3)), np.zeros((instants, 3)), np.zeros((instants, 3, 3)), np.zeros(steps),
+        np.zeros(count + 1, np.int64), np.zeros((count, 4)), np.zeros((count, 3)), np.zeros((count, 3)),
+    )  # fmt: skip
+    return pushed, turn_memory(), np.zeros((steps, 4)), np.zeros((steps, 3))
 
 
 @per_robot
