@@ -239,9 +239,12 @@ def described_robot(robot: Path | None) -> RobotDescription | None:
     """Return a robot's description; ``None`` without one. Raises ``AloftError``."""
     if robot is None:
         return None
-    from ..robots.description import find_robot
+    from ..robots.description import RobotError, find_robot
 
-    return find_robot(str(robot))
+    try:
+        return find_robot(str(robot))
+    except (LookupError, RobotError) as error:
+        raise AloftError(f"--robot {robot}: {error.args[0]}") from error
 
 
 def forces_of_feet(widths: Mapping[str, int], robot: RobotDescription) -> dict[str, str]:
