@@ -95,8 +95,8 @@ class TurnMemory(NamedTuple):
 def turn_memory() -> TurnMemory:
     """Allocate the memory of one step."""
     return TurnMemory(
-        np.zeros((3, 3)), *np.zeros((3, 3)), np.zeros(7), np.zeros(7), np.zeros((4, 7))
-    )
+        np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(7), np.zeros(7), np.zeros((4, 7))
+    )  # fmt: skip
 
 
 @kernel

@@ -397,9 +397,9 @@ class ExactDynamics:
 
     def _of_seen(self, count: int) -> tuple[Any, ...]:
         """Return the arguments of ``see_motion``."""
-        joints, contacts = len(self._rotors), len(self.contact_frames)
+        joints, contacts, fixed = len(self._rotors), len(self.contact_frames), self._fixed
         return (
-            self._tree, FixedPoints(*(each[:contacts] for each in self._fixed)),
+            self._tree, FixedPoints(fixed.body[:contacts], fixed.place[:contacts], fixed.below[:contacts]),
             np.zeros((count, joints)), np.zeros((count, joints)), motion_memory(joints),
             _seen_memory(count, contacts),
         )  # fmt: skip
