@@ -26,6 +26,14 @@ def euler_matrix(sine: Vector3, cosine: Vector3, out: Matrix3) -> None:
 
 
 @kernel
+def turn_ahead(turn: Matrix3, vector: Array1D, out: Vector3) -> None:
+    """Components in the world of the first three numbers of a row in the body's axes."""
+    x, y, z = vector[0], vector[1], vector[2]
+    for axis in range(3):
+        out[axis] = (turn[axis, 0] * x + turn[axis, 1] * y + turn[axis, 2] * z) + 0.0
+
+
+@kernel
 def turn_back(turn: Matrix3, vector: Array1D, out: Vector3) -> None:
     """Components in the body's axes of the first three numbers of a row."""
     x, y, z = vector[0], vector[1], vector[2]
@@ -77,10 +85,8 @@ def motions_in_world(
     for i in range(velocity.shape[0]):
         euler_matrix(sine[i], cosine[i], turn)
         sx, sz, cx, cz = sine[i, 1], sine[i, 2], cosine[i, 1], cosine[i, 2]
-        x, y, z = velocity[i, 0], velocity[i, 1], velocity[i, 2]
+        turn_ahead(turn, velocity[i], rate[i, 0:3])
         p, q, r = velocity[i, 3], velocity[i, 4], velocity[i, 5]
-        for axis in range(3):
-            rate[i, axis] = (turn[axis, 0] * x + turn[axis, 1] * y + turn[axis, 2] * z) + 0.0
         about_y = (sz * p + cz * q) / cx
         rate[i, 3], rate[i, 4], rate[i, 5] = about_y, cz * p - sz * q, r + about_y * sx
         for k in range(6, rate.shape[1]):

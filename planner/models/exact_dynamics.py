@@ -20,17 +20,21 @@ from ...mathematics.arrays import Array
 from ...mathematics.body_dynamics import body_motion
 from ...mathematics.compiling.kernel_on_rows import KernelOnRows
 from ...mathematics.constants import GRAVITY
+from ...mathematics.pushed_motion import (
+    PushedTurns,
+    SeenMotion,
+    Stretches,
+    follow_stretches,
+    turn_memory,
+)
 from ...mathematics.rotations import cross_products, matrices_of_quaternions, skew
 from ...mathematics.whole_body_motion import (
     FixedPoints,
     GivenMotion,
     MotionTerms,
-    PushedTurns,
     evaluate_motion,
-    follow_turns,
     motion_memory,
     set_poses_at_instants,
-    turn_memory,
     velocities_at_points,
 )
 from ...robots.description import RobotDescription
@@ -136,7 +140,9 @@ class ExactDynamics:
         self._centres = self._fixed._replace(below=np.zeros_like(self._fixed.below))
         self._evaluations: dict[tuple[bool, int], KernelOnRows] = {}
         self._poses = KernelOnRows(set_poses_at_instants, self._of_poses)
-        self._turns = KernelOnRows(follow_turns, _of_turns)
+        self._stretches = KernelOnRows(
+            follow_stretches, partial(_of_stretches, len(robot.contacts))
+        )
         self._speeds = KernelOnRows(velocities_at_points, self._of_speeds)
         self._links = (robot.base, *(joint.child for joint in robot.joints))
         self._columns = [self._moving(frame) for frame in built.contact_frames]
@@ -484,59 +490,46 @@ class ExactDynamics:
         base, twist, angles, speeds, force, steps, counts = segments
         first = np.concatenate([[0], np.cumsum(counts)])
         of_step = np.repeat(np.arange(len(counts)), counts)
-        seen = self._at_origin(angles, speeds)
-        starts, ends = (
-            2 * first[:-1] + np.arange(len(counts)),
-            2 * np.arange(1, len(steps) + 1) + of_step,
-        )
-        inertia, turn = seen.inertia[:, WHOLE], matrices_of_quaternions(base[:, 3:7])
-        inverse: Array = np.asarray(np.linalg.inv(inertia), dtype=np.float64)
-        arms = seen.points[:, : force.shape[1]] - seen.com[:, None]
-        lever = np.einsum("nci,ncj->nij", arms, np.repeat(force, 2 * counts + 1, axis=0))
-        # From the centre of a ball its lowest point is one radius down in the world.
-        moment = np.zeros((len(counts), 3))
-        for ball in self.balls:
-            moment[:, 0] += ball.radius * force[:, ball.point, 1]
-            moment[:, 1] -= ball.radius * force[:, ball.point, 0]
-        com, rate, carried = seen.com[starts], seen.com_velocity[starts], seen.momentum[starts]
-        momentum = times(turn, times(inertia[starts], twist[:, 3:]) + carried)
-        pushed, _, *turned = self._turns.rows(len(angles), len(steps), len(counts))
-        given = (
-            inverse, times(inverse, seen.momentum), lever, steps, first, base[:, 3:7], momentum, moment
-        )  # fmt: skip
-        for own, values in zip(pushed, given, strict=True):
-            own[:] = values
-        self._turns.run()
-        orientation, turning = (each.copy() for each in turned)
-        # The centre of mass flies a parabola; the base follows from it.
         over = np.cumsum(steps)
-        time = (over - np.concatenate([[0.0], over])[first[of_step]])[:, None]
-        fall = force.sum(axis=1) / self.mass - np.array([0.0, 0.0, GRAVITY])
-        speed = times(turn, twist[:, :3] + cross_products(twist[:, 3:], com) + rate)
-        flown = (
-            (base[:, :3] + times(turn, com))[of_step]
-            + time * speed[of_step]
-            + 0.5 * time**2 * fall[of_step]
-        )
-        flying = speed[of_step] + time * fall[of_step]
-        turns, com = matrices_of_quaternions(orientation), seen.com[ends]
-        spins = times(inverse[ends], times_transposed(turns, turning) - seen.momentum[ends])
-        linear = (
-            times_transposed(turns, flying) - cross_products(spins, com) - seen.com_velocity[ends]
-        )
+        terms = self._at_origin(angles, speeds)
+        call = self._stretches
+        seen, given, _, pushed, place, velocity = call.rows(len(angles), len(steps), len(counts))
+        for own, values in zip(seen, (
+            terms.com, terms.com_velocity, terms.momentum, terms.inertia,
+            np.linalg.inv(terms.inertia[:, WHOLE]), terms.points[:, : len(self.contact_frames)],
+        ), strict=True):  # fmt: skip
+            own[:] = values
+        given.step[:], given.first[:], given.base[:], given.twist[:] = steps, first, base, twist
+        given.passed[:] = over - np.concatenate([[0.0], over])[first[of_step]]
+        given.force[:] = force
+        given.fall[:] = force.sum(axis=1) / self.mass - np.array([0.0, 0.0, GRAVITY])
+        # From the centre of a ball its lowest point is one radius down in the world.
+        given.moment[:] = 0.0
+        for ball in self.balls:
+            given.moment[:, 0] += ball.radius * force[:, ball.point, 1]
+            given.moment[:, 1] -= ball.radius * force[:, ball.point, 0]
+        call.run()
+        ends = 2 * np.arange(1, len(steps) + 1) + of_step
         return (
-            np.hstack([flown - times(turns, com), orientation, angles[ends]]),
-            np.hstack([linear, spins, speeds[ends]]),
+            np.hstack([place, pushed.orientation, angles[ends]]),
+            np.hstack([velocity, speeds[ends]]),
         )
 
 
-def _of_turns(instants: int, steps: int, count: int) -> tuple[Any, ...]:
-    """Return the arguments of ``follow_turns``."""
-    pushed = PushedTurns(
-        np.zeros((instants, 3, 3)), np.zeros((instants, 3)), np.zeros((instants, 3, 3)), np.zeros(steps),
-        np.zeros(count + 1, np.int64), np.zeros((count, 4)), np.zeros((count, 3)), np.zeros((count, 3)),
+def _of_stretches(contacts: int, instants: int, steps: int, count: int) -> tuple[Any, ...]:
+    """Return the arguments of ``follow_stretches``."""
+    seen = SeenMotion(
+        *np.zeros((3, instants, 3)), np.zeros((instants, 6)), np.zeros((instants, 3, 3)),
+        np.zeros((instants, contacts, 3)),
     )  # fmt: skip
-    return pushed, turn_memory(), np.zeros((steps, 4)), np.zeros((steps, 3))
+    given = Stretches(
+        *np.zeros((2, steps)), np.zeros(count + 1, np.int64), np.zeros((count, 7)), np.zeros((count, 6)),
+        np.zeros((count, contacts, 3)), *np.zeros((2, count, 3)),
+    )  # fmt: skip
+    pushed = PushedTurns(
+        np.zeros((instants, 3)), np.zeros((instants, 3, 3)), np.zeros((steps, 4)), np.zeros((steps, 3))
+    )  # fmt: skip
+    return seen, given, turn_memory(), pushed, np.zeros((steps, 3)), np.zeros((steps, 6))
 
 
 @per_robot

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args, get_origin
 
@@ -167,15 +168,18 @@ class Parameters(BaseModel):
         if not isinstance(data, dict):
             return data
         converted = dict(data)
-        for name, info in cls.model_fields.items():
-            if converted.get(name) == "none" and takes_none(info):
+        for name in data:
+            info = cls.model_fields.get(name)
+            if info is None:
+                continue
+            if converted[name] == "none" and takes_none(info):
                 converted[name] = None
             unit = unit_of(info)
-            if name in converted and unit:
-                try:
+            if unit:
+                with suppress(
+                    UnitError
+                ):  # stays a text, which pydantic then reports at its own place
                     converted[name] = _convert(converted[name], unit)
-                except UnitError:
-                    continue  # stays a text, which pydantic then reports at its own place
         return converted
 
 
