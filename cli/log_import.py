@@ -193,14 +193,9 @@ def _beside(graph: Path, file: Path) -> Path:
 
 def _clock(log: LogFile, played: dict[str, Any], guessed: Mapping[str, Guess]) -> list[str]:
     """Guess the unit of stamps that have none, and take those whose steps vary much for arrival times; say so."""
-    from ..hal.log.columns import (
-        MOST_APART,
-        MOST_JITTER,
-        LogClock,
-        moments_of,
-        usual_step,
-    )
+    from ..hal.log.columns import MOST_APART, MOST_JITTER, LogClock, moments_of, usual_step
     from ..hal.log.log_file import LogError
+    from ..hal.log.series import GAP, Series
 
     if "clock" not in played:
         return []
@@ -215,25 +210,28 @@ def _clock(log: LogFile, played: dict[str, Any], guessed: Mapping[str, Guess]) -
             notes.append(
                 f"the stamps are taken for {fits[0]}, {rate:.4g} rows a second (clock.unit)"
             )
+    given = LogClock.model_validate(clock)
     try:
-        moments = moments_of(log, LogClock.model_validate(clock), len(stamps.values), None)
+        times = moments_of(log, given, len(stamps.values), None).times
     except LogError as error:
         return [*notes, str(error)]
     # a table of several topics has numbers of each in some of its rows only, whose steps count
-    jitters = [moments.jitter]
+    spreads = [Series(times, stamps.values).spread()]
     for columns in guessed.values():
-        arrays = [
-            log.array(name).values for name in (columns if isinstance(columns, list) else [columns])
-        ]
-        if {len(each) for each in arrays} == {len(moments.times)}:
-            steps = np.diff(moments.times[np.isfinite(np.hstack(arrays)).all(axis=1)])
-            jitters.append(float(steps.std() / steps.mean()) if steps.any() else 0.0)
-    if min(jitters) <= MOST_JITTER:
+        names = columns if isinstance(columns, list) else [columns]
+        arrays = [log.array(name).values for name in names]
+        if {len(each) for each in arrays} == {len(times)}:
+            rows = np.isfinite(np.hstack(arrays)).all(axis=1)
+            if rows.any():
+                spreads.append(Series(times[rows], stamps.values[rows]).spread())
+    even = given.model_copy(update={"even": True})
+    shift = moments_of(log, even, len(times), None).shift
+    if min(spreads) <= MOST_JITTER or shift > GAP * usual_step(times):  # rows are missing
         return notes
     clock["even"] = True
     return [
         *notes,
-        f"the steps between stamps vary by {100.0 * jitters[0]:.0f} %: they are taken for arrival times, rows evenly apart (clock.even)",
+        f"the steps between stamps vary by {100.0 * min(spreads):.0f} %: they are taken for arrival times, rows evenly apart (clock.even)",
     ]
 
 
@@ -241,9 +239,12 @@ def described_robot(robot: Path | None) -> RobotDescription | None:
     """Return a robot's description; ``None`` without one. Raises ``AloftError``."""
     if robot is None:
         return None
-    from ..robots.description import find_robot
+    from ..robots.description import RobotError, find_robot
 
-    return find_robot(str(robot))
+    try:
+        return find_robot(str(robot))
+    except (LookupError, RobotError) as error:
+        raise AloftError(f"--robot {robot}: {error.args[0]}") from error
 
 
 def forces_of_feet(widths: Mapping[str, int], robot: RobotDescription) -> dict[str, str]:

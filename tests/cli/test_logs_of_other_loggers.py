@@ -153,3 +153,20 @@ def test_the_unit_of_stamps_is_guessed_by_their_steps(
     clock = yaml.safe_load((tmp_path / "graph.yaml").read_text())["blocks"]["robot"]["with"]["clock"]  # fmt: skip
     assert clock == {"stamps": "stamp"} | ({"unit": unit} if unit else {})
     assert ("rows a second (clock.unit)" in capsys.readouterr().out) == (unit is not None)
+
+
+@pytest.mark.parametrize(
+    ("late", "missing", "even"),
+    [(0.0, 0, False), (0.5, 0, True), (0.0, 150, False), (0.5, 150, False)],
+)
+def test_only_arrival_times_of_all_rows_get_an_even_grid(
+    tmp_path: Path, late: float, missing: int, even: bool
+) -> None:
+    chance, rows = np.random.default_rng(0), np.arange(400)
+    stamps = 0.01 * (rows + late * chance.random(400))
+    stamps[100:] += 0.01 * missing
+    table = np.column_stack([stamps, *RATES[rows % ROWS].T, *FORCES[rows % ROWS].T])
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header="t,wx,wy,wz,ax,ay,az")
+    import_log(tmp_path / "log.csv", None, tmp_path / "graph.yaml")
+    clock = yaml.safe_load((tmp_path / "graph.yaml").read_text())["blocks"]["robot"]["with"]["clock"]  # fmt: skip
+    assert clock.get("even", False) == even
