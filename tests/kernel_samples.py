@@ -283,7 +283,11 @@ UNUSED = {
         TREE, AT_TWO.position[0], AT_TWO.velocity[0], AT_TWO.bend[0], motion_memory(10),
     ),
     "aloft.mathematics.whole_body_motion.momentum_terms": (
-        AT_TWO.velocity[1], 1, IN_MOTION, EVALUATED,
+        AT_TWO.velocity[1, 6:], IN_MOTION, *np.zeros((3, 3)), np.zeros(6),
+    ),
+    "aloft.mathematics.body_dynamics.add_carried_inertias": (TREE, IN_MOTION.composite),
+    "aloft.mathematics.pushed_motion.see_motion": (
+        TREE, SOLES_OF_TREE, 0.3 * NORMAL((5, 10)), NORMAL((5, 10)), motion_memory(10), SEEN,
     ),
     "aloft.mathematics.whole_body_motion.point_terms": (
         SOLES_OF_TREE, AT_TWO.position[0], 0, body_motion(10), EVALUATED,

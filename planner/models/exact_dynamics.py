@@ -25,6 +25,7 @@ from ...mathematics.pushed_motion import (
     SeenMotion,
     Stretches,
     follow_stretches,
+    see_motion,
     turn_memory,
 )
 from ...mathematics.rotations import cross_products, matrices_of_quaternions, skew
@@ -137,9 +138,9 @@ class ExactDynamics:
         self._rotors = robot.rotor_matrix
         self._tree = body_tree(robot)
         self._fixed = self._fixed_points(robot)
-        self._centres = self._fixed._replace(below=np.zeros_like(self._fixed.below))
-        self._evaluations: dict[tuple[bool, int], KernelOnRows] = {}
+        self._motions: dict[int, KernelOnRows] = {}
         self._poses = KernelOnRows(set_poses_at_instants, self._of_poses)
+        self._seen = KernelOnRows(see_motion, self._of_seen)
         self._stretches = KernelOnRows(
             follow_stretches, partial(_of_stretches, len(robot.contacts))
         )
@@ -336,7 +337,33 @@ class ExactDynamics:
         The torques are those of the joints with their rotors, without friction. The points are the contact
         points and behind them the sole centres.
         """
-        return self._evaluate(self._fixed, position, velocity, bend, force)
+        pushed = 0 if force is None else force.shape[1]
+        if pushed not in self._motions:
+            self._motions[pushed] = KernelOnRows(evaluate_motion, partial(self._of_motion, pushed))
+        call = self._motions[pushed]
+        _, _, given, _, terms = call.rows(len(position))
+        given.position[:], given.velocity[:] = position, velocity
+        given.bend[:] = 0.0 if bend is None else bend
+        if force is not None:
+            given.force[:] = force
+        call.run()
+        found = MotionTerms(*(array.copy() for array in terms))
+        found.torque[:] += given.bend @ self._rotors.T
+        return found
+
+    def _of_motion(self, pushed: int, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``evaluate_motion`` with forces on so many points."""
+        joints, points = len(self._rotors), (len(self._fixed.body), 3)
+        shapes = (
+            (count, 3), (count, 3), (count, 3), (count, 6), (count, *points), (count, *points),
+            (count, *points), (count, 6), (count, joints),
+        )  # fmt: skip
+        given = GivenMotion(
+            np.zeros((count, 7 + joints)), np.zeros((count, 6 + joints)), np.zeros((count, joints)),
+            np.zeros((count, pushed, 3)),
+        )  # fmt: skip
+        terms = MotionTerms(*(np.zeros(shape) for shape in shapes))
+        return self._tree, self._fixed, given, motion_memory(joints), terms
 
     def link_poses(self, position: Array) -> LinkPoses:
         """Return the poses of the links in n states (n, n_positions), the base first."""
@@ -353,56 +380,29 @@ class ExactDynamics:
             np.zeros((count, links, 3)), np.zeros((count, links, 9)),
         )  # fmt: skip
 
-    def _evaluate(
-        self, fixed: FixedPoints, position: Array, velocity: Array, bend: Array | None, force: Array | None
-    ) -> MotionTerms:  # fmt: skip
-        key = fixed is self._fixed, 0 if force is None else force.shape[1]
-        if key not in self._evaluations:
-            make = partial(self._of_motion, fixed, key[1])
-            self._evaluations[key] = KernelOnRows(evaluate_motion, make)
-        call = self._evaluations[key]
-        _, _, given, _, terms = call.rows(len(position))
-        given.position[:], given.velocity[:] = position, velocity
-        given.bend[:] = 0.0 if bend is None else bend
-        if force is not None:
-            given.force[:] = force
-        call.run()
-        found = MotionTerms(*(array.copy() for array in terms))
-        found.torque[:] += given.bend @ self._rotors.T
-        return found
-
-    def _of_motion(self, fixed: FixedPoints, pushed: int, count: int) -> tuple[Any, ...]:
-        """Return the arguments of ``evaluate_motion`` with forces on so many points."""
-        joints, points = len(self._rotors), (len(fixed.body), 3)
-        shapes = (
-            (count, 3), (count, 3), (count, 3), (count, 6), (count, *points), (count, *points),
-            (count, *points), (count, 6), (count, joints),
-        )  # fmt: skip
-        given = GivenMotion(
-            np.zeros((count, 7 + joints)), np.zeros((count, 6 + joints)), np.zeros((count, joints)),
-            np.zeros((count, pushed, 3)),
-        )  # fmt: skip
-        terms = MotionTerms(*(np.zeros(shape) for shape in shapes))
-        return self._tree, fixed, given, motion_memory(joints), terms
-
     def standing_inertia(self, joints: Array) -> tuple[Array, Array]:
         """Return the centre of mass [m] (3,) and the inertia about it [kg m^2] (3, 3) of a robot with those joint
         angles, as rigid, seen from its base.
         """
-        terms = self._at_origin(joints[None], np.zeros((1, len(joints))))
-        return terms.com[0], terms.inertia[0][WHOLE]
+        seen = self._seen_motion(joints[None], np.zeros((1, len(joints))))
+        return seen.com[0].copy(), seen.inertia[0][WHOLE]
 
-    def _at_origin(self, angles: Array, speeds: Array) -> MotionTerms:
-        """Return the terms of the joints' motion, both (n, n_joints), in the base's axes. Of balls the points are the
-        centres.
-        """
-        position, velocity = (
-            np.zeros((len(angles), self.model.nq)),
-            np.zeros((len(angles), self.model.nv)),
-        )
-        position[:, 6] = 1.0
-        position[:, 7:], velocity[:, 6:] = angles, speeds
-        return self._evaluate(self._centres, position, velocity, None, None)
+    def _seen_motion(self, angles: Array, speeds: Array) -> SeenMotion:
+        """Return what the joints' motion, both (n, n_joints), shows from the base, until the next call."""
+        _, _, own_angles, own_speeds, _, seen = self._seen.rows(len(angles))
+        own_angles[:], own_speeds[:] = angles, speeds
+        self._seen.run()
+        found: SeenMotion = seen
+        return found
+
+    def _of_seen(self, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``see_motion``."""
+        joints, contacts, fixed = len(self._rotors), len(self.contact_frames), self._fixed
+        return (
+            self._tree, FixedPoints(fixed.body[:contacts], fixed.place[:contacts], fixed.below[:contacts]),
+            np.zeros((count, joints)), np.zeros((count, joints)), motion_memory(joints),
+            _seen_memory(count, contacts),
+        )  # fmt: skip
 
     def mass_matrix(self, q: Array) -> Array:
         """Return the joint-space inertia with all rotors."""
@@ -491,14 +491,11 @@ class ExactDynamics:
         first = np.concatenate([[0], np.cumsum(counts)])
         of_step = np.repeat(np.arange(len(counts)), counts)
         over = np.cumsum(steps)
-        terms = self._at_origin(angles, speeds)
         call = self._stretches
         seen, given, _, pushed, place, velocity = call.rows(len(angles), len(steps), len(counts))
-        for own, values in zip(seen, (
-            terms.com, terms.com_velocity, terms.momentum, terms.inertia,
-            np.linalg.inv(terms.inertia[:, WHOLE]), terms.points[:, : len(self.contact_frames)],
-        ), strict=True):  # fmt: skip
-            own[:] = values
+        for own, found in zip(seen, self._seen_motion(angles, speeds), strict=True):
+            own[:] = found
+        seen.inverse[:] = np.linalg.inv(seen.inertia[:, WHOLE])
         given.step[:], given.first[:], given.base[:], given.twist[:] = steps, first, base, twist
         given.passed[:] = over - np.concatenate([[0.0], over])[first[of_step]]
         given.force[:] = force
@@ -518,18 +515,23 @@ class ExactDynamics:
 
 def _of_stretches(contacts: int, instants: int, steps: int, count: int) -> tuple[Any, ...]:
     """Return the arguments of ``follow_stretches``."""
-    seen = SeenMotion(
-        *np.zeros((3, instants, 3)), np.zeros((instants, 6)), np.zeros((instants, 3, 3)),
-        np.zeros((instants, contacts, 3)),
-    )  # fmt: skip
     given = Stretches(
-        *np.zeros((2, steps)), np.zeros(count + 1, np.int64), np.zeros((count, 7)), np.zeros((count, 6)),
-        np.zeros((count, contacts, 3)), *np.zeros((2, count, 3)),
+        np.zeros(steps), np.zeros(steps), np.zeros(count + 1, np.int64), np.zeros((count, 7)), np.zeros((count, 6)),
+        np.zeros((count, contacts, 3)), np.zeros((count, 3)), np.zeros((count, 3)),
     )  # fmt: skip
     pushed = PushedTurns(
         np.zeros((instants, 3)), np.zeros((instants, 3, 3)), np.zeros((steps, 4)), np.zeros((steps, 3))
     )  # fmt: skip
-    return seen, given, turn_memory(), pushed, np.zeros((steps, 3)), np.zeros((steps, 6))
+    return (
+        _seen_memory(instants, contacts), given, turn_memory(), pushed, np.zeros((steps, 3)), np.zeros((steps, 6)),
+    )  # fmt: skip
+
+
+def _seen_memory(count: int, contacts: int) -> SeenMotion:
+    return SeenMotion(
+        np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 6)),
+        np.zeros((count, 3, 3)), np.zeros((count, contacts, 3)),
+    )  # fmt: skip
 
 
 @per_robot
