@@ -51,6 +51,41 @@ def multiply_matrices(a: Array2D, b: Array2D, out: Array2D) -> None:
 
 
 @kernel
+def weighted_sum(weights: Array1D, rows: Array2D, out: Array1D) -> None:
+    """Sum ``rows`` (n, m) times their ``weights`` (n) into ``out`` (m), leaving out those that have none."""
+    for j in range(out.shape[0]):
+        out[j] = 0.0
+    for i in range(weights.shape[0]):
+        if weights[i] != 0.0:
+            add_multiple(out, weights[i], rows[i])
+
+
+@kernel
+def add_multiple(target: Array1D, factor: float, values: Array1D) -> None:
+    """Add a multiple of an array to another one."""
+    for j in range(target.shape[0]):
+        target[j] = target[j] + factor * values[j]
+
+
+@kernel
+def pairwise_sum(values: Array1D) -> float:
+    """Return the sum in the order in which NumPy adds up to 128 numbers along memory: in eight columns, and then those."""
+    count = values.shape[0]
+    whole = count - count % 8
+    total = 0.0
+    if whole > 0:
+        a, b, c, d = values[0], values[1], values[2], values[3]
+        e, f, g, h = values[4], values[5], values[6], values[7]
+        for k in range(8, whole, 8):
+            a, b, c, d = a + values[k], b + values[k + 1], c + values[k + 2], d + values[k + 3]
+            e, f, g, h = e + values[k + 4], f + values[k + 5], g + values[k + 6], h + values[k + 7]
+        total = ((a + b) + (c + d)) + ((e + f) + (g + h))
+    for k in range(whole, count):
+        total += values[k]
+    return total
+
+
+@kernel
 def multiply_sparse(a: Array2D, b: Array2D, out: Array2D) -> None:
     """Multiply as ``multiply_matrices``, leaving out the zeros of an ``a`` that has many."""
     for i in range(a.shape[0]):

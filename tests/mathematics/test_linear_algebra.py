@@ -14,6 +14,7 @@ from aloft.mathematics.linear_algebra import (
     inverse,
     multiply_matrices,
     multiply_vector,
+    pairwise_sum,
     product,
     solve_damped,
     solve_positive,
@@ -21,6 +22,7 @@ from aloft.mathematics.linear_algebra import (
     solve_rows_transposed,
     solve_transposed,
     solve_upper,
+    weighted_sum,
 )
 
 
@@ -35,6 +37,23 @@ def test_products_are_numpys() -> None:
     product = np.empty((3, 2))
     multiply_matrices(a, b, product)
     np.testing.assert_allclose(product, a @ b, rtol=1e-14)
+
+
+def test_a_weighted_sum_has_the_bits_of_numpys_along_the_first_axis() -> None:
+    rng = np.random.default_rng(0)
+    for n, m in ((1, 3), (7, 50), (60, 4), (300, 11)):
+        weights, rows, out = rng.normal(size=n), rng.normal(size=(n, m)), np.ones(m)
+        weights[rng.random(n) < 0.3] = 0.0
+        weighted_sum(weights, rows, out)
+        used = np.flatnonzero(weights)
+        assert (out == (weights[used, None] * rows[used]).sum(axis=0)).all()
+
+
+def test_a_pairwise_sum_has_the_bits_of_numpys_along_memory() -> None:
+    rng = np.random.default_rng(1)
+    for count in range(129):
+        values = rng.normal(size=count) * 10.0 ** rng.integers(-3, 3, size=count)
+        assert pairwise_sum(values) == values.sum()
 
 
 def positive(seed=0, n=5):

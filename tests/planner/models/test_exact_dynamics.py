@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 from tests.robots.limbed_robots import quadruped
 
-from aloft.planner.models.exact_dynamics import ExactDynamics, JointMotion, rotation_between
+from aloft.mathematics.compiling.compile_calls import run_compiled
+from aloft.mathematics.whole_body_motion import velocities_at_points
+from aloft.planner.models.exact_dynamics import (
+    ExactDynamics,
+    JointMotion,
+    rotation_between,
+)
 from aloft.robots.description import RobotDescription, find_robot
 
 
@@ -110,6 +116,7 @@ def test_many_states_at_once_are_those_of_pinocchio(robot: RobotDescription) -> 
     bend, force = rng.normal(size=(6, 6 + n)), rng.normal(size=(6, len(robot.contacts), 3)) * 20.0
     terms = dynamics.motion(q, v, bend[:, 6:], force)
     left = dynamics.base_residual(q, v, bend, force)
+    feet = dynamics.feet(q, v)
     for i in range(6):
         for found, wanted in zip(
             (terms.com, terms.com_velocity, terms.momentum),
@@ -120,6 +127,8 @@ def test_many_states_at_once_are_those_of_pinocchio(robot: RobotDescription) -> 
         points, jacobian = dynamics.contact_jacobians(q[i])
         soles, heading = dynamics.soles(q[i])
         np.testing.assert_allclose(terms.points[i], np.vstack([points, soles]), atol=1e-13)
+        np.testing.assert_allclose(feet.soles[i], soles, atol=1e-13)
+        np.testing.assert_allclose(feet.yaw[i], heading, atol=1e-12)
         speeds = (jacobian @ v[i]).reshape(-1, 3)
         np.testing.assert_allclose(terms.point_velocity[i, : len(points)], speeds, atol=1e-12)
         pushed = jacobian.T @ force[i].ravel()
@@ -127,7 +136,24 @@ def test_many_states_at_once_are_those_of_pinocchio(robot: RobotDescription) -> 
         np.testing.assert_allclose(left[i], (moved - pushed)[:6], atol=1e-10)
         ahead = terms.ahead[i, len(points) :]
         if not dynamics.balls:
+            np.testing.assert_allclose(
+                feet.sole_velocity[i], terms.point_velocity[i, len(points) :], atol=1e-12
+            )
             np.testing.assert_allclose(np.arctan2(ahead[:, 1], ahead[:, 0]), heading, atol=1e-12)
+
+
+def test_speeds_of_points_have_the_bits_of_whole_jacobians() -> None:
+    rng, count, points, size = np.random.default_rng(4), 50, 3, 21
+    columns, velocity = rng.normal(size=(count, size, 6)), rng.normal(size=(count, size))
+    places, moves = rng.normal(size=(count, points, 3)), rng.random((points, size)) < 0.6
+    found = np.empty((count, points, 6))
+    run_compiled(velocities_at_points, columns, moves, places, velocity, np.empty((6, size)), found)
+    for point in range(points):
+        x, y, z = places[:, point].T[:, :, None]
+        a, b, c, p, q, r = np.moveaxis(columns, -1, 0)
+        at_point = a - (y * r - z * q), b - (z * p - x * r), c - (x * q - y * p), p, q, r
+        jacobian = np.where(moves[point], np.stack(at_point, axis=1), 0.0)
+        assert (found[:, point] == (jacobian * velocity[:, None]).sum(axis=-1)).all()
 
 
 Array = np.ndarray
