@@ -167,16 +167,25 @@ class Parameters(BaseModel):
         if not isinstance(data, dict):
             return data
         converted = dict(data)
-        for name, info in cls.model_fields.items():
-            if converted.get(name) == "none" and takes_none(info):
+        for name, unit, or_none in _written_forms(cls):
+            if name not in converted:
+                continue
+            if or_none and converted[name] == "none":
                 converted[name] = None
-            unit = unit_of(info)
-            if name in converted and unit:
+            if unit:
                 try:
                     converted[name] = _convert(converted[name], unit)
                 except UnitError:
                     continue  # stays a text, which pydantic then reports at its own place
         return converted
+
+
+@lru_cache(maxsize=1024)
+def _written_forms(params: type[Parameters]) -> tuple[tuple[str, str, bool], ...]:
+    """Return the parameters that may be written otherwise than pydantic reads them: their units, and whether ``none`` is
+    a value."""
+    forms = ((name, unit_of(info), takes_none(info)) for name, info in params.model_fields.items())
+    return tuple(form for form in forms if form[1] or form[2])
 
 
 @lru_cache(maxsize=1024)
