@@ -102,6 +102,8 @@ class LogFile:
             missing = np.isnat(numbers)
             count = numbers.astype(f"{numbers.dtype.kind}8[ns]").astype(np.int64)
             numbers, unit = (np.where(missing, np.nan, count) if missing.any() else count), "ns"
+        if numbers.ndim > 2:  # MATLAB's loggers write columns x 1 x rows
+            numbers = numbers.squeeze()
         reason = _no_column(numbers)
         if reason:
             self.refused[name] = reason

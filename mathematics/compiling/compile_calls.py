@@ -51,6 +51,13 @@ def compile_calls(calls: Sequence[KernelCall]) -> str:
         return str(error) or type(error).__name__
 
 
+def run_compiled(kernel: Callable[..., None], *arguments: Any) -> None:
+    """Call a kernel once, as machine code where that can be."""
+    call = KernelCall(kernel, *arguments)
+    compile_calls([call])
+    call.run()
+
+
 class _Compilation:
     """The machine code for some calls; kernels whose code is nowhere are compiled one by one."""
 

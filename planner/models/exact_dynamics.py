@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,20 +17,25 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
-from ...mathematics.compiling.compile_calls import compile_calls
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.body_dynamics import body_motion
+from ...mathematics.compiling.kernel_on_rows import KernelOnRows
 from ...mathematics.constants import GRAVITY
+from ...mathematics.pushed_motion import (
+    PushedTurns,
+    SeenMotion,
+    Stretches,
+    follow_stretches,
+    see_motion,
+    turn_memory,
+)
 from ...mathematics.rotations import cross_products, matrices_of_quaternions, skew
 from ...mathematics.whole_body_motion import (
     FixedPoints,
     GivenMotion,
     MotionTerms,
-    PushedTurns,
     evaluate_motion,
-    follow_turns,
     motion_memory,
     set_poses_at_instants,
-    turn_memory,
     velocities_at_points,
 )
 from ...robots.description import RobotDescription
@@ -40,8 +46,6 @@ from .euler_angles import times, times_transposed
 
 WHOLE = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]
 """Places of the parts xx, yy, zz, xy, xz, yz of an inertia in its matrix."""
-KEPT_CALLS = 32
-"""Calls whose memory is kept: as many numbers of instants."""
 Motion = tuple[Array, Array, Array]
 """Joint angles, velocities and accelerations."""
 AFTER, BEFORE = [1, 2, 0], [2, 0, 1]
@@ -132,10 +136,15 @@ class ExactDynamics:
         self.mass = robot.total_mass
         self._rotor_coupling = built.rotor_coupling
         self._rotors = robot.rotor_matrix
-        self._tree, self._memory = body_tree(robot), motion_memory(len(robot.joints))
+        self._tree = body_tree(robot)
         self._fixed = self._fixed_points(robot)
-        self._centres = self._fixed._replace(below=np.zeros_like(self._fixed.below))
-        self._calls: dict[object, tuple[KernelCall, GivenMotion, MotionTerms]] = {}
+        self._motions: dict[int, KernelOnRows] = {}
+        self._poses = KernelOnRows(set_poses_at_instants, self._of_poses)
+        self._seen = KernelOnRows(see_motion, self._of_seen)
+        self._stretches = KernelOnRows(
+            follow_stretches, partial(_of_stretches, len(robot.contacts))
+        )
+        self._speeds = KernelOnRows(velocities_at_points, self._of_speeds)
         self._links = (robot.base, *(joint.child for joint in robot.joints))
         self._columns = [self._moving(frame) for frame in built.contact_frames]
         self._foot_moves = np.zeros((len(built.sole_frames), self.model.nv), np.bool_)
@@ -227,7 +236,8 @@ class ExactDynamics:
     def feet(self, position: Array, velocity: Array) -> FeetStates:
         """Return what a reference of the controller holds of n states."""
         pin, model, data = self.pin, self.model, self.data
-        count, feet = len(position), len(self.sole_frames)
+        count = len(position)
+        columns, _, places, speeds, _, rates = self._speeds.rows(count)
         # What Pinocchio computes is written in memory that stays. There the frames follow each other, each with the
         # columns of its rotation and its place.
         first, second = (data.oMf[k].rotation.T for k in range(2))
@@ -236,24 +246,22 @@ class ExactDynamics:
             data.com[0], data.hg.linear, data.hg.angular, data.J.T,
             as_strided(first, (len(data.oMf), 4, 3), (apart, 24, 8), writeable=False),
         )  # fmt: skip
-        found = [np.empty((count, *each.shape)) for each in read]
+        com, linear, angular = np.empty((3, count, 3))
+        frames = np.empty((count, *read[-1].shape))
+        found = com, linear, angular, columns, frames
         for i, (q, v) in enumerate(zip(position, velocity, strict=True)):
             pin.computeCentroidalMomentum(model, data, q, v)
             pin.computeJointJacobians(model, data)
             pin.updateFramePlacements(model, data)
             for each, now in zip(found, read, strict=True):
                 each[i] = now
-        com, linear, angular, columns, frames = found
         contacts, soles = frames[:, self.contact_frames], frames[:, self.sole_frames]
-        points, places, up = contacts[:, :, 3], soles[:, :, 3], soles[:, :, 2]
+        points, up = contacts[:, :, 3], soles[:, :, 2]
+        places[:], speeds[:] = soles[:, :, 3], velocity
         # The base's own first axis is the linear part of the column that it moves along.
         yaw, pitch = self._angles(soles[:, :, 0], columns[:, 0, :3])
-        rates, share = np.empty((count, feet, 6)), np.empty((6, model.nv))
-        run_compiled(
-            KernelCall(
-                velocities_at_points, columns, self._foot_moves, places, velocity, share, rates
-            )
-        )
+        self._speeds.run()
+        places, rates = places.copy(), rates.copy()
         for ball in self.balls:
             points[:, ball.point] += ball.radius * (
                 contacts[:, ball.point, 2] - np.array([0.0, 0.0, 1.0])
@@ -265,6 +273,14 @@ class ExactDynamics:
         return FeetStates(
             com, linear / self.mass, angular, points, places, rates[:, :, :3], yaw, pitch
         )
+
+    def _of_speeds(self, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``velocities_at_points`` for the sole centres."""
+        feet, size = self._foot_moves.shape
+        return (
+            np.zeros((count, size, 6)), self._foot_moves, np.zeros((count, feet, 3)),
+            np.zeros((count, size)), np.zeros((6, size)), np.zeros((count, feet, 6)),
+        )  # fmt: skip
 
     def foot_angles(self) -> tuple[Array, Array]:
         """Return the heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated last. A ball
@@ -321,30 +337,11 @@ class ExactDynamics:
         The torques are those of the joints with their rotors, without friction. The points are the contact
         points and behind them the sole centres.
         """
-        return self._evaluate(self._fixed, position, velocity, bend, force)
-
-    def link_poses(self, position: Array) -> LinkPoses:
-        """Return the poses of the links in n states (n, n_positions), the base first."""
-        place = np.zeros((len(position), len(self._links), 3))
-        rotation = np.zeros((*place.shape[:2], 9))
-        run_compiled(
-            KernelCall(
-                set_poses_at_instants, self._tree, np.ascontiguousarray(position), self._memory.motion, place, rotation,
-            )
-        )  # fmt: skip
-        return LinkPoses(self._links, place, rotation.reshape(*place.shape, 3))
-
-    def _evaluate(
-        self, fixed: FixedPoints, position: Array, velocity: Array, bend: Array | None, force: Array | None
-    ) -> MotionTerms:  # fmt: skip
-        count, joints = len(position), len(self._rotors)
-        pushes = (count, 0, 3) if force is None else force.shape
-        key = fixed is self._fixed, pushes
-        if key not in self._calls:
-            if len(self._calls) >= KEPT_CALLS:
-                self._calls.clear()
-            self._calls[key] = self._evaluation(fixed, joints, pushes)
-        call, given, terms = self._calls[key]
+        pushed = 0 if force is None else force.shape[1]
+        if pushed not in self._motions:
+            self._motions[pushed] = KernelOnRows(evaluate_motion, partial(self._of_motion, pushed))
+        call = self._motions[pushed]
+        _, _, given, _, terms = call.rows(len(position))
         given.position[:], given.velocity[:] = position, velocity
         given.bend[:] = 0.0 if bend is None else bend
         if force is not None:
@@ -354,42 +351,58 @@ class ExactDynamics:
         found.torque[:] += given.bend @ self._rotors.T
         return found
 
-    def _evaluation(
-        self, fixed: FixedPoints, joints: int, pushes: tuple[int, ...]
-    ) -> tuple[KernelCall, GivenMotion, MotionTerms]:
-        """Return the call for so many instants, with its memory: to make a call takes longer than to run it."""
-        count, points = pushes[0], (len(fixed.body), 3)
+    def _of_motion(self, pushed: int, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``evaluate_motion`` with forces on so many points."""
+        joints, points = len(self._rotors), (len(self._fixed.body), 3)
         shapes = (
             (count, 3), (count, 3), (count, 3), (count, 6), (count, *points), (count, *points),
             (count, *points), (count, 6), (count, joints),
         )  # fmt: skip
         given = GivenMotion(
             np.zeros((count, 7 + joints)), np.zeros((count, 6 + joints)), np.zeros((count, joints)),
-            np.zeros(pushes),
+            np.zeros((count, pushed, 3)),
         )  # fmt: skip
         terms = MotionTerms(*(np.zeros(shape) for shape in shapes))
-        call = KernelCall(evaluate_motion, self._tree, fixed, given, self._memory, terms)
-        compile_calls([call])
-        return call, given, terms
+        return self._tree, self._fixed, given, motion_memory(joints), terms
+
+    def link_poses(self, position: Array) -> LinkPoses:
+        """Return the poses of the links in n states (n, n_positions), the base first."""
+        _, given, _, place, rotation = self._poses.rows(len(position))
+        given[:] = position
+        self._poses.run()
+        return LinkPoses(self._links, place.copy(), rotation.reshape(*place.shape, 3).copy())
+
+    def _of_poses(self, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``set_poses_at_instants``."""
+        links = len(self._links)
+        return (
+            self._tree, np.zeros((count, self.model.nq)), body_motion(len(self._rotors)),
+            np.zeros((count, links, 3)), np.zeros((count, links, 9)),
+        )  # fmt: skip
 
     def standing_inertia(self, joints: Array) -> tuple[Array, Array]:
         """Return the centre of mass [m] (3,) and the inertia about it [kg m^2] (3, 3) of a robot with those joint
         angles, as rigid, seen from its base.
         """
-        terms = self._at_origin(joints[None], np.zeros((1, len(joints))))
-        return terms.com[0], terms.inertia[0][WHOLE]
+        seen = self._seen_motion(joints[None], np.zeros((1, len(joints))))
+        return seen.com[0].copy(), seen.inertia[0][WHOLE]
 
-    def _at_origin(self, angles: Array, speeds: Array) -> MotionTerms:
-        """Return the terms of the joints' motion, both (n, n_joints), in the base's axes. Of balls the points are the
-        centres.
-        """
-        position, velocity = (
-            np.zeros((len(angles), self.model.nq)),
-            np.zeros((len(angles), self.model.nv)),
-        )
-        position[:, 6] = 1.0
-        position[:, 7:], velocity[:, 6:] = angles, speeds
-        return self._evaluate(self._centres, position, velocity, None, None)
+    def _seen_motion(self, angles: Array, speeds: Array) -> SeenMotion:
+        """Return what the joints' motion, both (n, n_joints), shows from the base, until the next call."""
+        _, _, own_angles, own_speeds, _, seen = self._seen.rows(len(angles))
+        own_angles[:], own_speeds[:] = angles, speeds
+        self._seen.run()
+        found: SeenMotion = seen
+        return found
+
+    def _of_seen(self, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``see_motion``."""
+        joints, contacts, fixed = len(self._rotors), len(self.contact_frames), self._fixed
+        return (
+            self._tree, FixedPoints(fixed.body[:contacts], fixed.place[:contacts], fixed.below[:contacts]),
+            np.zeros((count, joints)), np.zeros((count, joints)), motion_memory(joints),
+            _seen_memory(count, contacts),
+        )  # fmt: skip
 
     def mass_matrix(self, q: Array) -> Array:
         """Return the joint-space inertia with all rotors."""
@@ -477,54 +490,48 @@ class ExactDynamics:
         base, twist, angles, speeds, force, steps, counts = segments
         first = np.concatenate([[0], np.cumsum(counts)])
         of_step = np.repeat(np.arange(len(counts)), counts)
-        seen = self._at_origin(angles, speeds)
-        starts, ends = (
-            2 * first[:-1] + np.arange(len(counts)),
-            2 * np.arange(1, len(steps) + 1) + of_step,
-        )
-        inertia, turn = seen.inertia[:, WHOLE], matrices_of_quaternions(base[:, 3:7])
-        inverse: Array = np.asarray(np.linalg.inv(inertia), dtype=np.float64)
-        arms = seen.points[:, : force.shape[1]] - seen.com[:, None]
-        lever = np.einsum("nci,ncj->nij", arms, np.repeat(force, 2 * counts + 1, axis=0))
-        # From the centre of a ball its lowest point is one radius down in the world.
-        moment = np.zeros((len(counts), 3))
-        for ball in self.balls:
-            moment[:, 0] += ball.radius * force[:, ball.point, 1]
-            moment[:, 1] -= ball.radius * force[:, ball.point, 0]
-        com, rate, carried = seen.com[starts], seen.com_velocity[starts], seen.momentum[starts]
-        momentum = times(turn, times(inertia[starts], twist[:, 3:]) + carried)
-        orientation, turning = np.empty((len(steps), 4)), np.empty((len(steps), 3))
-        pushed = PushedTurns(
-            inverse, times(inverse, seen.momentum), np.ascontiguousarray(lever), steps, first,
-            base[:, 3:7].copy(), momentum, moment,
-        )  # fmt: skip
-        run_compiled(KernelCall(follow_turns, pushed, turn_memory(), orientation, turning))
-        # The centre of mass flies a parabola; the base follows from it.
         over = np.cumsum(steps)
-        time = (over - np.concatenate([[0.0], over])[first[of_step]])[:, None]
-        fall = force.sum(axis=1) / self.mass - np.array([0.0, 0.0, GRAVITY])
-        speed = times(turn, twist[:, :3] + cross_products(twist[:, 3:], com) + rate)
-        flown = (
-            (base[:, :3] + times(turn, com))[of_step]
-            + time * speed[of_step]
-            + 0.5 * time**2 * fall[of_step]
-        )
-        flying = speed[of_step] + time * fall[of_step]
-        turns, com = matrices_of_quaternions(orientation), seen.com[ends]
-        spins = times(inverse[ends], times_transposed(turns, turning) - seen.momentum[ends])
-        linear = (
-            times_transposed(turns, flying) - cross_products(spins, com) - seen.com_velocity[ends]
-        )
+        call = self._stretches
+        seen, given, _, pushed, place, velocity = call.rows(len(angles), len(steps), len(counts))
+        for own, found in zip(seen, self._seen_motion(angles, speeds), strict=True):
+            own[:] = found
+        seen.inverse[:] = np.linalg.inv(seen.inertia[:, WHOLE])
+        given.step[:], given.first[:], given.base[:], given.twist[:] = steps, first, base, twist
+        given.passed[:] = over - np.concatenate([[0.0], over])[first[of_step]]
+        given.force[:] = force
+        given.fall[:] = force.sum(axis=1) / self.mass - np.array([0.0, 0.0, GRAVITY])
+        # From the centre of a ball its lowest point is one radius down in the world.
+        given.moment[:] = 0.0
+        for ball in self.balls:
+            given.moment[:, 0] += ball.radius * force[:, ball.point, 1]
+            given.moment[:, 1] -= ball.radius * force[:, ball.point, 0]
+        call.run()
+        ends = 2 * np.arange(1, len(steps) + 1) + of_step
         return (
-            np.hstack([flown - times(turns, com), orientation, angles[ends]]),
-            np.hstack([linear, spins, speeds[ends]]),
+            np.hstack([place, pushed.orientation, angles[ends]]),
+            np.hstack([velocity, speeds[ends]]),
         )
 
 
-def run_compiled(call: KernelCall) -> None:
-    """Make a call as machine code where that can be."""
-    compile_calls([call])
-    call.run()
+def _of_stretches(contacts: int, instants: int, steps: int, count: int) -> tuple[Any, ...]:
+    """Return the arguments of ``follow_stretches``."""
+    given = Stretches(
+        np.zeros(steps), np.zeros(steps), np.zeros(count + 1, np.int64), np.zeros((count, 7)), np.zeros((count, 6)),
+        np.zeros((count, contacts, 3)), np.zeros((count, 3)), np.zeros((count, 3)),
+    )  # fmt: skip
+    pushed = PushedTurns(
+        np.zeros((instants, 3)), np.zeros((instants, 3, 3)), np.zeros((steps, 4)), np.zeros((steps, 3))
+    )  # fmt: skip
+    return (
+        _seen_memory(instants, contacts), given, turn_memory(), pushed, np.zeros((steps, 3)), np.zeros((steps, 6)),
+    )  # fmt: skip
+
+
+def _seen_memory(count: int, contacts: int) -> SeenMotion:
+    return SeenMotion(
+        np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 6)),
+        np.zeros((count, 3, 3)), np.zeros((count, contacts, 3)),
+    )  # fmt: skip
 
 
 @per_robot

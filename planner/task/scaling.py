@@ -58,7 +58,8 @@ def per_robot(function: _OfRobot[_Parameters, _Result]) -> _OfRobot[_Parameters,
         robot: RobotDescription, *args: _Parameters.args, **kwargs: _Parameters.kwargs
     ) -> _Result:
         # A description is not hashable, and two of the same content may be different objects.
-        key = _text_of(robot), f"{args} {sorted(kwargs.items())}"
+        given = f"{args} {sorted(kwargs.items())}" if args or kwargs else ""
+        key = _text_of(robot), given
         if key not in kept:
             kept[key] = function(robot, *args, **kwargs)
         kept.move_to_end(key)

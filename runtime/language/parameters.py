@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args, get_origin
 
@@ -167,25 +168,21 @@ class Parameters(BaseModel):
         if not isinstance(data, dict):
             return data
         converted = dict(data)
-        for name, unit, or_none in _written_forms(cls):
-            if name not in converted:
-                continue
+        forms = _written_forms(cls)
+        for name in data:
+            unit, or_none = forms.get(name, ("", False))
             if or_none and converted[name] == "none":
                 converted[name] = None
             if unit:
-                try:
+                with suppress(UnitError):  # stays a text, which pydantic then reports at its place
                     converted[name] = _convert(converted[name], unit)
-                except UnitError:
-                    continue  # stays a text, which pydantic then reports at its own place
         return converted
 
 
 @lru_cache(maxsize=1024)
-def _written_forms(params: type[Parameters]) -> tuple[tuple[str, str, bool], ...]:
-    """Return the parameters that may be written otherwise than pydantic reads them: their units, and whether ``none`` is
-    a value."""
-    forms = ((name, unit_of(info), takes_none(info)) for name, info in params.model_fields.items())
-    return tuple(form for form in forms if form[1] or form[2])
+def _written_forms(params: type[Parameters]) -> Mapping[str, tuple[str, bool]]:
+    """Return the unit of each parameter, and whether ``none`` may stand for its null."""
+    return {n: (unit_of(info), takes_none(info)) for n, info in params.model_fields.items()}
 
 
 @lru_cache(maxsize=1024)

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 from tests.robots.limbed_robots import quadruped
 
-from aloft.mathematics.compiling.kernel_call import KernelCall
+from aloft.mathematics.compiling.compile_calls import run_compiled
 from aloft.mathematics.whole_body_motion import velocities_at_points
 from aloft.planner.models.exact_dynamics import (
     ExactDynamics,
     JointMotion,
     rotation_between,
-    run_compiled,
 )
 from aloft.robots.description import RobotDescription, find_robot
 
@@ -148,10 +147,7 @@ def test_speeds_of_points_have_the_bits_of_whole_jacobians() -> None:
     columns, velocity = rng.normal(size=(count, size, 6)), rng.normal(size=(count, size))
     places, moves = rng.normal(size=(count, points, 3)), rng.random((points, size)) < 0.6
     found = np.empty((count, points, 6))
-    call = KernelCall(
-        velocities_at_points, columns, moves, places, velocity, np.empty((6, size)), found
-    )
-    run_compiled(call)
+    run_compiled(velocities_at_points, columns, moves, places, velocity, np.empty((6, size)), found)
     for point in range(points):
         x, y, z = places[:, point].T[:, :, None]
         a, b, c, p, q, r = np.moveaxis(columns, -1, 0)
