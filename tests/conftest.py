@@ -1,8 +1,10 @@
 """Settings for all tests."""
 
+import compileall
 import gc
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -31,9 +33,15 @@ gc.set_threshold(*COLLECTED_AFTER)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let each worker begin to collect all tests at another place. To rewrite the assertions takes twice
-    as long as the rest of it, and a worker reads from the cache what another one has rewritten."""
-    if hasattr(config, "workerinput") and config.args_source is config.ArgsSource.TESTPATHS:
+    """Compile the package once for all processes, as they keep no bytecode from the end of the collection
+    on. And let each worker begin to collect all tests at another place. To rewrite the assertions takes
+    twice as long as the rest of it, and a worker reads from the cache what another one has rewritten."""
+    if config.args_source is not config.ArgsSource.TESTPATHS:
+        return
+    if not hasattr(config, "workerinput"):
+        for folder in () if sys.dont_write_bytecode else ROOT.glob("[a-z]*/"):
+            compileall.compile_dir(folder, quiet=2, rx=re.compile("/tests/"))
+    else:
         folders = [ROOT / "tests", *ROOT.glob("extensions/*/tests"), ROOT / "lab" / "tests"]
         parts = sorted(
             part

@@ -255,7 +255,7 @@ def pack(problem: FullProblem, plan: PlannedJump, guess: Array | None = None) ->
 
 _evaluators: dict[tuple[int, int], tuple[SymbolicModel, tuple[Lanes, ...]]] = {}
 KEPT = 32
-"""Evaluators that are kept, of a model and a number of instants."""
+"""Evaluators that are kept, of a model and a number of instants, and functions of models."""
 
 
 def _evaluate(
@@ -298,6 +298,8 @@ def _functions(model: SymbolicModel, pushed: int) -> tuple[Any, Any]:
     import casadi as ca
 
     if id(model) not in _of_models:
+        if len(_of_models) >= KEPT:
+            _of_models.clear()
         place, rate, bend_of = (ca.SX.sym(name, model.size) for name in ("q", "v", "a"))
         pushes = ca.SX.sym("F", pushed)
         whole = centroidal_momentum(model, place, rate)
