@@ -214,22 +214,19 @@ class ExactDynamics:
         count = len(position)
         columns, _, places, speeds, _, rates = self._speeds.rows(count)
         # What Pinocchio computes is written in memory that stays. There the frames follow each other, each with the
-        # columns of its rotation and its place.
+        # columns of its rotation and its place, and the linear momentum and the angular one.
         first, second = (data.oMf[k].rotation.T for k in range(2))
         apart = second.ctypes.data - first.ctypes.data
-        read = (
-            data.com[0], data.hg.linear, data.hg.angular, data.J.T,
-            as_strided(first, (len(data.oMf), 4, 3), (apart, 24, 8), writeable=False),
-        )  # fmt: skip
-        com, linear, angular = np.empty((3, count, 3))
-        frames = np.empty((count, *read[-1].shape))
-        found = com, linear, angular, columns, frames
+        place, momentum = data.com[0], as_strided(data.hg.linear, (6,), (8,), writeable=False)
+        jacobian = data.J.T
+        placed = as_strided(first, (len(data.oMf), 4, 3), (apart, 24, 8), writeable=False)
+        com, spatial = np.empty((count, 3)), np.empty((count, 6))
+        frames = np.empty((count, *placed.shape))
         for i, (q, v) in enumerate(zip(position, velocity, strict=True)):
             pin.computeCentroidalMomentum(model, data, q, v)
             pin.computeJointJacobians(model, data)
             pin.updateFramePlacements(model, data)
-            for each, now in zip(found, read, strict=True):
-                each[i] = now
+            com[i], spatial[i], columns[i], frames[i] = place, momentum, jacobian, placed
         contacts, soles = frames[:, self.contact_frames], frames[:, self.sole_frames]
         points, up = contacts[:, :, 3], soles[:, :, 2]
         places[:], speeds[:] = soles[:, :, 3], velocity
@@ -246,7 +243,14 @@ class ExactDynamics:
             turn = rates[:, ball.foot, 3:]
             rates[:, ball.foot, :3] += ball.radius * cross_products(turn, up[:, ball.foot])
         return FeetStates(
-            com, linear / self.mass, angular, points, places, rates[:, :, :3], yaw, pitch
+            com,
+            spatial[:, :3] / self.mass,
+            spatial[:, 3:],
+            points,
+            places,
+            rates[:, :, :3],
+            yaw,
+            pitch,
         )
 
     def _of_speeds(self, count: int) -> tuple[Any, ...]:

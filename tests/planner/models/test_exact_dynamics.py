@@ -143,6 +143,9 @@ def test_many_states_at_once_are_those_of_pinocchio(robot: RobotDescription) -> 
         points, jacobian = dynamics.contact_jacobians(q[i])
         soles, heading = dynamics.soles(q[i])
         np.testing.assert_allclose(terms.points[i], np.vstack([points, soles]), atol=1e-13)
+        for name in ("com", "com_velocity", "momentum"):
+            found, wanted = getattr(feet, name)[i], getattr(terms, name)[i]
+            np.testing.assert_allclose(found, wanted, atol=1e-12)
         np.testing.assert_allclose(feet.soles[i], soles, atol=1e-13)
         np.testing.assert_allclose(feet.yaw[i], heading, atol=1e-12)
         speeds = (jacobian @ v[i]).reshape(-1, 3)
