@@ -94,8 +94,8 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
     assembly, coordinates, model = problem.assembly, problem.coordinates, problem.exact
     n, count = coordinates.size, problem.knots
     times = knot_times(problem, values)
-    q = np.array([values[s : s + n] for s in assembly.state_start]) @ coordinates.matrix.T
-    v = np.array([values[s + n : s + 2 * n] for s in assembly.state_start]) @ coordinates.matrix.T
+    states = values[assembly.state_start[:, None] + np.arange(2 * n)]
+    q, v = states[:, :n] @ coordinates.matrix.T, states[:, n:] @ coordinates.matrix.T
     bend, force = np.zeros((count, model.size)), np.zeros((count, 3 * len(model.robot.contacts)))
     grounded = np.zeros((count, len(model.robot.contacts)), dtype=bool)
     impacts = np.zeros(count, dtype=bool)
