@@ -245,7 +245,7 @@ class Evidence:
         first = np.searchsorted(samples.knot, np.arange(len(time) - 1))
         nearest = np.flatnonzero(apart == np.minimum.reduceat(apart, first)[samples.knot])
         found = nearest[np.searchsorted(nearest, first)]
-        return np.asarray(found[np.diff(time) > 0.0], np.int64)
+        return np.asarray(found[self.plan.lasting], np.int64)
 
     @cached_property
     def shapes(self) -> Shapes:
@@ -348,7 +348,7 @@ class Evidence:
 
     def figures(self) -> dict[str, float]:
         """Return the plan's performance and loads, by name with unit."""
-        r, lasting = self.replay, np.diff(self.plan.time) > 0.0
+        r, lasting = self.replay, self.plan.lasting
         force = self.plan.contact_force[:-1][lasting].sum(axis=1)[:, 2]
         k = r.flights[0][0]
         return {

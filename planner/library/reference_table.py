@@ -140,7 +140,7 @@ class _States(NamedTuple):
 def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, float]) -> _States:
     """Return the motion, knots and what lies between them; two rows at an impact."""
     last = len(plan.time) - 1
-    lengths = np.diff(plan.time)
+    lengths = plan.steps
     longest = [steps.get(Phase(phase), STEP) for phase in plan.phase[:-1].tolist()]
     counts = np.maximum(np.ceil(lengths / longest - 1e-9), 1.0).astype(np.int64)
     knot = np.repeat(np.arange(last), counts)
@@ -201,7 +201,7 @@ def _middle_values(
     """Return what the intervals' values (n_knots, m) are at instants in those intervals: linear from one middle to the
     next, never across lift-off or touchdown.
     """
-    lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
+    lasting = plan.lasting
     ends = np.array([knot for flight in flight_knots(plan) for knot in flight])
     found = np.empty((len(instants), values.shape[1]))
     number = np.searchsorted(ends, intervals, side="right")
