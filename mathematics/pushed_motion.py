@@ -18,9 +18,17 @@ from typing import NamedTuple
 import numpy as np
 
 from .arrays import Array1D, Array2D, Array3D, Indices1D, Matrix3, Rows3, Vector3
+from .body_dynamics import (
+    BodyTree,
+    add_carried_inertias,
+    body_inertia,
+    point_position,
+    set_body_poses,
+)
 from .euler_motion import turn_ahead, turn_back
 from .kernel import kernel
 from .rotations import to_matrix
+from .whole_body_motion import FixedPoints, MotionMemory, momentum_terms
 
 
 class SeenMotion(NamedTuple):
@@ -87,8 +95,26 @@ class TurnMemory(NamedTuple):
 def turn_memory() -> TurnMemory:
     """Allocate the memory of one step."""
     return TurnMemory(
-        np.zeros((3, 3)), *np.zeros((3, 3)), np.zeros(7), np.zeros(7), np.zeros((4, 7))
-    )
+        np.zeros((3, 3)), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(7), np.zeros(7), np.zeros((4, 7))
+    )  # fmt: skip
+
+
+@kernel
+def see_motion(
+    tree: BodyTree, points: FixedPoints, angles: Array2D, speeds: Array2D, memory: MotionMemory, seen: SeenMotion
+) -> None:  # fmt: skip
+    """Compute all of ``seen`` but ``inverse`` at the joints' angles and speeds, both (n, n_joints)."""
+    motion, composite = memory.motion, memory.composite
+    for i in range(angles.shape[0]):
+        set_body_poses(tree, angles[i], motion)
+        for body in range(composite.mass.shape[0]):
+            body_inertia(tree, motion, body, composite)
+        add_carried_inertias(tree, composite)
+        momentum_terms(
+            speeds[i], memory, seen.com[i], seen.com_velocity[i], seen.momentum[i], seen.inertia[i]
+        )
+        for k in range(points.body.shape[0]):
+            point_position(motion, points.body[k], points.place[k], seen.points[i, k])
 
 
 @kernel

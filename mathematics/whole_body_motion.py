@@ -103,7 +103,9 @@ def evaluate_motion(
     for i in range(given.position.shape[0]):
         set_poses_and_velocities(tree, given.position[i], given.velocity[i], given.bend[i], memory)
         composite_inertias(tree, memory.motion, memory.composite)
-        momentum_terms(given.velocity[i], i, memory, out)
+        momentum_terms(
+            given.velocity[i, 6:], memory, out.com[i], out.com_velocity[i], out.momentum[i], out.inertia[i]
+        )  # fmt: skip
         point_terms(fixed, given.position[i], i, memory.motion, out)
         base_acceleration(given, i, memory, out)
         joint_torques(tree, fixed, given, i, memory, out)
@@ -161,24 +163,27 @@ def set_poses_and_velocities(
 
 
 @kernel
-def momentum_terms(velocity: Array1D, i: int, memory: MotionMemory, out: MotionTerms) -> None:
-    """Centre of mass, momentum and inertia about it at instant ``i``, seen from the base."""
+def momentum_terms(
+    speed: Array1D, memory: MotionMemory, com: Vector3, com_velocity: Vector3, momentum: Vector3, inertia: Array1D
+) -> None:  # fmt: skip
+    """Centre of mass, its velocity, angular momentum and inertia about it, seen from the base, at the joints' speeds
+    (n_joints,)."""
     motion, composite = memory.motion, memory.composite
     spatial, total = memory.spatial, memory.momentum
     momentum_of(composite, 0, motion.velocity[0], total)
     for k in range(motion.joint.shape[0]):
         momentum_of(composite, k + 1, motion.joint[k], spatial)
         for axis in range(6):
-            total[axis] = total[axis] + spatial[axis] * velocity[6 + k]
-    mass, com, inertia = composite.mass[0], out.com[i], out.inertia[i]
+            total[axis] = total[axis] + spatial[axis] * speed[k]
+    mass = composite.mass[0]
     for axis in range(3):
         com[axis] = composite.moment[0, axis] / mass
-        out.com_velocity[i, axis] = total[axis] / mass
+        com_velocity[axis] = total[axis] / mass
     x, y, z = com[0], com[1], com[2]
     u, v, w = total[0], total[1], total[2]
-    out.momentum[i, 0] = total[3] - (y * w - z * v)
-    out.momentum[i, 1] = total[4] - (z * u - x * w)
-    out.momentum[i, 2] = total[5] - (x * v - y * u)
+    momentum[0] = total[3] - (y * w - z * v)
+    momentum[1] = total[4] - (z * u - x * w)
+    momentum[2] = total[5] - (x * v - y * u)
     for axis in range(6):
         inertia[axis] = composite.inertia[0, axis]
     inertia[0] = inertia[0] - mass * (y * y + z * z)

@@ -204,6 +204,9 @@ UNUSED = {
     "aloft.mathematics.segment_distances.segment_gap": tuple(NORMAL((4, 3))),
     "aloft.mathematics.segment_distances.capsule_gaps": (*CAPSULES, *CAPSULES, np.zeros((4, 3))),
     "aloft.mathematics.elementary.hypot": (0.3, -0.4),
+    "aloft.mathematics.interpolation.cubic_motion": (
+        *NORMAL((2, 4, 3)), np.array([0.0, 0.1, 0.1, 0.3]), np.array([0, 1, 2]), np.array([0.05, 0.0, 0.1]), *np.zeros((3, 3, 3)),
+    ),
     "aloft.mathematics.euler_motion.euler_matrix": (*NORMAL((2, 3)), np.zeros((3, 3))),
     "aloft.mathematics.euler_motion.turn_ahead": (NORMAL((3, 3)), NORMAL(6), np.zeros(3)),
     "aloft.mathematics.euler_motion.turn_back": (NORMAL((3, 3)), NORMAL(6), np.zeros(3)),
@@ -283,7 +286,11 @@ UNUSED = {
         TREE, AT_TWO.position[0], AT_TWO.velocity[0], AT_TWO.bend[0], motion_memory(10),
     ),
     "aloft.mathematics.whole_body_motion.momentum_terms": (
-        AT_TWO.velocity[1], 1, IN_MOTION, EVALUATED,
+        AT_TWO.velocity[1, 6:], IN_MOTION, *np.zeros((3, 3)), np.zeros(6),
+    ),
+    "aloft.mathematics.body_dynamics.add_carried_inertias": (TREE, IN_MOTION.composite),
+    "aloft.mathematics.pushed_motion.see_motion": (
+        TREE, SOLES_OF_TREE, 0.3 * NORMAL((5, 10)), NORMAL((5, 10)), motion_memory(10), SEEN,
     ),
     "aloft.mathematics.whole_body_motion.point_terms": (
         SOLES_OF_TREE, AT_TWO.position[0], 0, body_motion(10), EVALUATED,

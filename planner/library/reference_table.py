@@ -35,8 +35,8 @@ from ..models.exact_dynamics import (
     AFTER,
     BEFORE,
     ExactDynamics,
-    JointMotion,
     dynamics_of,
+    states_between,
 )
 from ..task.phase import Phase
 from ..task.plan import PlannedJump
@@ -150,7 +150,7 @@ def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, fl
     position, velocity = plan.position[knot], plan.velocity[knot]
     bend = plan.acceleration[knot, 3:]
     position[between], velocity[between], bend[between] = _between(
-        plan, dynamics, knot[between], passed[between, None]
+        plan, dynamics, knot[between], passed[between]
     )
     still = np.zeros((1, plan.velocity.shape[1] - 3))
     return _States(
@@ -165,14 +165,13 @@ def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, fl
 def _between(
     plan: PlannedJump, dynamics: ExactDynamics, knot: NDArray[np.int64], passed: Array
 ) -> tuple[Array, Array, Array]:
-    """Return Pinocchio's q and v at those times (n, 1) since knots, and the accelerations of ``_States``: the cubics of
+    """Return Pinocchio's q and v at those times since knots, both (n,), and the accelerations of ``_States``: the cubics of
     base position, Euler angles and joints between two knots.
     """
     q, v = coordinates_of(plan.position, plan.velocity)
     # The plan's own matrices: a matrix of the angles has other last bits.
     v[:, :3] = times(matrices_of_quaternions(plan.position[:, 3:7]), plan.velocity[:, :3])
-    length = (plan.time[knot + 1] - plan.time[knot])[:, None]
-    place, rate, bend = JointMotion(q[knot], q[knot + 1], v[knot], v[knot + 1], length).at(passed)
+    place, rate, bend = states_between(q, v, plan.time, knot, passed)
     velocity, acceleration = twist_of(place, rate, bend)
     quaternions = pinocchio_quaternions(dynamics.pin, rotation(place[:, 3:6][:, ORDER]))
     return (

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,11 +20,13 @@ from ...mathematics.arrays import Array
 from ...mathematics.body_dynamics import body_motion
 from ...mathematics.compiling.kernel_on_rows import KernelOnRows
 from ...mathematics.constants import GRAVITY
+from ...mathematics.interpolation import cubic_motion
 from ...mathematics.pushed_motion import (
     PushedTurns,
     SeenMotion,
     Stretches,
     follow_stretches,
+    see_motion,
     turn_memory,
 )
 from ...mathematics.rotations import cross_products, matrices_of_quaternions, skew
@@ -46,35 +48,9 @@ from .euler_angles import times, times_transposed
 WHOLE = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]
 """Places of the parts xx, yy, zz, xy, xz, yz of an inertia in its matrix."""
 Motion = tuple[Array, Array, Array]
-"""Joint angles, velocities and accelerations."""
+"""Places, rates and the rates' changes."""
 AFTER, BEFORE = [1, 2, 0], [2, 0, 1]
 """The axes after and before each one: for cross products, which NumPy's own makes slowly."""
-
-
-class JointMotion(NamedTuple):
-    """The joints between two knots: the cubics through both ends' angles and velocities. Between many
-    pairs of knots at once all of it has a row for each, the durations (n, 1).
-
-    Where the plan's joint acceleration is constant over the interval this is exactly its motion.
-    """
-
-    start: Array
-    end: Array
-    start_velocity: Array
-    end_velocity: Array
-    duration: float | Array
-
-    def at(self, time: float | Array) -> Motion:
-        """Return the angles, velocities and accelerations [rad] at ``time`` since the first knot [s]; at n times (n, 1)
-        each is (n, n_joints).
-        """
-        t, u = self.duration, time / self.duration
-        way = self.end - self.start
-        bend = 3.0 * way - t * (2.0 * self.start_velocity + self.end_velocity)
-        twist = t * (self.start_velocity + self.end_velocity) - 2.0 * way
-        position = self.start + u * (t * self.start_velocity + u * (bend + u * twist))
-        velocity = self.start_velocity + u / t * (2.0 * bend + 3.0 * u * twist)
-        return position, velocity, (2.0 * bend + 6.0 * u * twist) / (t * t)
 
 
 class Segments(NamedTuple):
@@ -137,9 +113,9 @@ class ExactDynamics:
         self._rotors = robot.rotor_matrix
         self._tree = body_tree(robot)
         self._fixed = self._fixed_points(robot)
-        self._centres = self._fixed._replace(below=np.zeros_like(self._fixed.below))
-        self._evaluations: dict[tuple[bool, int], KernelOnRows] = {}
+        self._motions: dict[int, KernelOnRows] = {}
         self._poses = KernelOnRows(set_poses_at_instants, self._of_poses)
+        self._seen = KernelOnRows(see_motion, self._of_seen)
         self._stretches = KernelOnRows(
             follow_stretches, partial(_of_stretches, len(robot.contacts))
         )
@@ -238,22 +214,19 @@ class ExactDynamics:
         count = len(position)
         columns, _, places, speeds, _, rates = self._speeds.rows(count)
         # What Pinocchio computes is written in memory that stays. There the frames follow each other, each with the
-        # columns of its rotation and its place.
+        # columns of its rotation and its place, and the linear momentum and the angular one.
         first, second = (data.oMf[k].rotation.T for k in range(2))
         apart = second.ctypes.data - first.ctypes.data
-        read = (
-            data.com[0], data.hg.linear, data.hg.angular, data.J.T,
-            as_strided(first, (len(data.oMf), 4, 3), (apart, 24, 8), writeable=False),
-        )  # fmt: skip
-        com, linear, angular = np.empty((3, count, 3))
-        frames = np.empty((count, *read[-1].shape))
-        found = com, linear, angular, columns, frames
+        place, momentum = data.com[0], as_strided(data.hg.linear, (6,), (8,), writeable=False)
+        jacobian = data.J.T
+        placed = as_strided(first, (len(data.oMf), 4, 3), (apart, 24, 8), writeable=False)
+        com, spatial = np.empty((count, 3)), np.empty((count, 6))
+        frames = np.empty((count, *placed.shape))
         for i, (q, v) in enumerate(zip(position, velocity, strict=True)):
             pin.computeCentroidalMomentum(model, data, q, v)
             pin.computeJointJacobians(model, data)
             pin.updateFramePlacements(model, data)
-            for each, now in zip(found, read, strict=True):
-                each[i] = now
+            com[i], spatial[i], columns[i], frames[i] = place, momentum, jacobian, placed
         contacts, soles = frames[:, self.contact_frames], frames[:, self.sole_frames]
         points, up = contacts[:, :, 3], soles[:, :, 2]
         places[:], speeds[:] = soles[:, :, 3], velocity
@@ -270,7 +243,14 @@ class ExactDynamics:
             turn = rates[:, ball.foot, 3:]
             rates[:, ball.foot, :3] += ball.radius * cross_products(turn, up[:, ball.foot])
         return FeetStates(
-            com, linear / self.mass, angular, points, places, rates[:, :, :3], yaw, pitch
+            com,
+            spatial[:, :3] / self.mass,
+            spatial[:, 3:],
+            points,
+            places,
+            rates[:, :, :3],
+            yaw,
+            pitch,
         )
 
     def _of_speeds(self, count: int) -> tuple[Any, ...]:
@@ -336,7 +316,33 @@ class ExactDynamics:
         The torques are those of the joints with their rotors, without friction. The points are the contact
         points and behind them the sole centres.
         """
-        return self._evaluate(self._fixed, position, velocity, bend, force)
+        pushed = 0 if force is None else force.shape[1]
+        if pushed not in self._motions:
+            self._motions[pushed] = KernelOnRows(evaluate_motion, partial(self._of_motion, pushed))
+        call = self._motions[pushed]
+        _, _, given, _, terms = call.rows(len(position))
+        given.position[:], given.velocity[:] = position, velocity
+        given.bend[:] = 0.0 if bend is None else bend
+        if force is not None:
+            given.force[:] = force
+        call.run()
+        found = MotionTerms(*(array.copy() for array in terms))
+        found.torque[:] += given.bend @ self._rotors.T
+        return found
+
+    def _of_motion(self, pushed: int, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``evaluate_motion`` with forces on so many points."""
+        joints, points = len(self._rotors), (len(self._fixed.body), 3)
+        shapes = (
+            (count, 3), (count, 3), (count, 3), (count, 6), (count, *points), (count, *points),
+            (count, *points), (count, 6), (count, joints),
+        )  # fmt: skip
+        given = GivenMotion(
+            np.zeros((count, 7 + joints)), np.zeros((count, 6 + joints)), np.zeros((count, joints)),
+            np.zeros((count, pushed, 3)),
+        )  # fmt: skip
+        terms = MotionTerms(*(np.zeros(shape) for shape in shapes))
+        return self._tree, self._fixed, given, motion_memory(joints), terms
 
     def link_poses(self, position: Array) -> LinkPoses:
         """Return the poses of the links in n states (n, n_positions), the base first."""
@@ -353,56 +359,29 @@ class ExactDynamics:
             np.zeros((count, links, 3)), np.zeros((count, links, 9)),
         )  # fmt: skip
 
-    def _evaluate(
-        self, fixed: FixedPoints, position: Array, velocity: Array, bend: Array | None, force: Array | None
-    ) -> MotionTerms:  # fmt: skip
-        key = fixed is self._fixed, 0 if force is None else force.shape[1]
-        if key not in self._evaluations:
-            make = partial(self._of_motion, fixed, key[1])
-            self._evaluations[key] = KernelOnRows(evaluate_motion, make)
-        call = self._evaluations[key]
-        _, _, given, _, terms = call.rows(len(position))
-        given.position[:], given.velocity[:] = position, velocity
-        given.bend[:] = 0.0 if bend is None else bend
-        if force is not None:
-            given.force[:] = force
-        call.run()
-        found = MotionTerms(*(array.copy() for array in terms))
-        found.torque[:] += given.bend @ self._rotors.T
-        return found
-
-    def _of_motion(self, fixed: FixedPoints, pushed: int, count: int) -> tuple[Any, ...]:
-        """Return the arguments of ``evaluate_motion`` with forces on so many points."""
-        joints, points = len(self._rotors), (len(fixed.body), 3)
-        shapes = (
-            (count, 3), (count, 3), (count, 3), (count, 6), (count, *points), (count, *points),
-            (count, *points), (count, 6), (count, joints),
-        )  # fmt: skip
-        given = GivenMotion(
-            np.zeros((count, 7 + joints)), np.zeros((count, 6 + joints)), np.zeros((count, joints)),
-            np.zeros((count, pushed, 3)),
-        )  # fmt: skip
-        terms = MotionTerms(*(np.zeros(shape) for shape in shapes))
-        return self._tree, fixed, given, motion_memory(joints), terms
-
     def standing_inertia(self, joints: Array) -> tuple[Array, Array]:
         """Return the centre of mass [m] (3,) and the inertia about it [kg m^2] (3, 3) of a robot with those joint
         angles, as rigid, seen from its base.
         """
-        terms = self._at_origin(joints[None], np.zeros((1, len(joints))))
-        return terms.com[0], terms.inertia[0][WHOLE]
+        seen = self._seen_motion(joints[None], np.zeros((1, len(joints))))
+        return seen.com[0].copy(), seen.inertia[0][WHOLE]
 
-    def _at_origin(self, angles: Array, speeds: Array) -> MotionTerms:
-        """Return the terms of the joints' motion, both (n, n_joints), in the base's axes. Of balls the points are the
-        centres.
-        """
-        position, velocity = (
-            np.zeros((len(angles), self.model.nq)),
-            np.zeros((len(angles), self.model.nv)),
-        )
-        position[:, 6] = 1.0
-        position[:, 7:], velocity[:, 6:] = angles, speeds
-        return self._evaluate(self._centres, position, velocity, None, None)
+    def _seen_motion(self, angles: Array, speeds: Array) -> SeenMotion:
+        """Return what the joints' motion, both (n, n_joints), shows from the base, until the next call."""
+        _, _, own_angles, own_speeds, _, seen = self._seen.rows(len(angles))
+        own_angles[:], own_speeds[:] = angles, speeds
+        self._seen.run()
+        found: SeenMotion = seen
+        return found
+
+    def _of_seen(self, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``see_motion``."""
+        joints, contacts, fixed = len(self._rotors), len(self.contact_frames), self._fixed
+        return (
+            self._tree, FixedPoints(fixed.body[:contacts], fixed.place[:contacts], fixed.below[:contacts]),
+            np.zeros((count, joints)), np.zeros((count, joints)), motion_memory(joints),
+            _seen_memory(count, contacts),
+        )  # fmt: skip
 
     def mass_matrix(self, q: Array) -> Array:
         """Return the joint-space inertia with all rotors."""
@@ -459,30 +438,6 @@ class ExactDynamics:
         change[free] = np.linalg.solve(matrix[np.ix_(free, free)], pushed[free])
         return np.asarray(v + change), np.asarray((matrix @ change - pushed)[6:] * fixed[6:])
 
-    def integrate(
-        self, q: Array, v: Array, joints: JointMotion, force: Array, longest_step: float
-    ) -> list[tuple[float, Array, Array]]:
-        """Return the motion over one interval from the state (q, v) under constant contact forces (n_contacts, 3).
-
-        Returns time since the interval began [s], q and v after every step; ``q`` is followed as
-        position and quaternion, and the joints' part of both is the planned one.
-        """
-        duration = float(joints.duration)
-        count = max(1, int(np.ceil(duration / longest_step - 1e-9)))
-        h = duration / count
-        angles, speeds, _ = joints.at(np.asarray(0.5 * h * np.arange(2 * count + 1)[:, None]))
-        segment = Segments(
-            q[None, :7],
-            v[None, :6],
-            angles,
-            speeds,
-            force[None],
-            np.full(count, h),
-            np.array([count]),
-        )
-        places, rates = self.follow(segment)
-        return [(h * (i + 1), places[i], rates[i]) for i in range(count)]
-
     def follow(self, segments: Segments) -> tuple[Array, Array]:
         """Return the states after every step of all segments in turn: (n_steps, n_positions) and (n_steps,
         n_velocities).
@@ -491,14 +446,11 @@ class ExactDynamics:
         first = np.concatenate([[0], np.cumsum(counts)])
         of_step = np.repeat(np.arange(len(counts)), counts)
         over = np.cumsum(steps)
-        terms = self._at_origin(angles, speeds)
         call = self._stretches
         seen, given, _, pushed, place, velocity = call.rows(len(angles), len(steps), len(counts))
-        for own, values in zip(seen, (
-            terms.com, terms.com_velocity, terms.momentum, terms.inertia,
-            np.linalg.inv(terms.inertia[:, WHOLE]), terms.points[:, : len(self.contact_frames)],
-        ), strict=True):  # fmt: skip
-            own[:] = values
+        for own, found in zip(seen, self._seen_motion(angles, speeds), strict=True):
+            own[:] = found
+        seen.inverse[:] = np.linalg.inv(seen.inertia[:, WHOLE])
         given.step[:], given.first[:], given.base[:], given.twist[:] = steps, first, base, twist
         given.passed[:] = over - np.concatenate([[0.0], over])[first[of_step]]
         given.force[:] = force
@@ -518,18 +470,23 @@ class ExactDynamics:
 
 def _of_stretches(contacts: int, instants: int, steps: int, count: int) -> tuple[Any, ...]:
     """Return the arguments of ``follow_stretches``."""
-    seen = SeenMotion(
-        *np.zeros((3, instants, 3)), np.zeros((instants, 6)), np.zeros((instants, 3, 3)),
-        np.zeros((instants, contacts, 3)),
-    )  # fmt: skip
     given = Stretches(
-        *np.zeros((2, steps)), np.zeros(count + 1, np.int64), np.zeros((count, 7)), np.zeros((count, 6)),
-        np.zeros((count, contacts, 3)), *np.zeros((2, count, 3)),
+        np.zeros(steps), np.zeros(steps), np.zeros(count + 1, np.int64), np.zeros((count, 7)), np.zeros((count, 6)),
+        np.zeros((count, contacts, 3)), np.zeros((count, 3)), np.zeros((count, 3)),
     )  # fmt: skip
     pushed = PushedTurns(
         np.zeros((instants, 3)), np.zeros((instants, 3, 3)), np.zeros((steps, 4)), np.zeros((steps, 3))
     )  # fmt: skip
-    return seen, given, turn_memory(), pushed, np.zeros((steps, 3)), np.zeros((steps, 6))
+    return (
+        _seen_memory(instants, contacts), given, turn_memory(), pushed, np.zeros((steps, 3)), np.zeros((steps, 6)),
+    )  # fmt: skip
+
+
+def _seen_memory(count: int, contacts: int) -> SeenMotion:
+    return SeenMotion(
+        np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 6)),
+        np.zeros((count, 3, 3)), np.zeros((count, contacts, 3)),
+    )  # fmt: skip
 
 
 @per_robot
@@ -547,21 +504,33 @@ def rotation_between(first: Array, second: Array) -> Array:
     return np.asarray(4.0 * np.arcsin(np.minimum(1.0, 0.5 * half)))
 
 
-def joint_motion(plan_position: Array, plan_velocity: Array, time: Array, knot: int) -> JointMotion:
-    """Return the joints of a plan between that knot and the next."""
-    every = joint_motions(plan_position, plan_velocity, time, np.array([knot]))
-    start, end, before, after, _ = every
-    duration = float(time[knot + 1] - time[knot])
-    return JointMotion(start[0], end[0], before[0], after[0], duration)
+def states_between(
+    place: Array, rate: Array, time: Array, knots: NDArray[np.int64], passed: Array
+) -> Motion:
+    """Return the places and rates of a motion and the rates' changes, each (n, m), at times ``passed`` since some knots,
+    both (n,): the cubics through the places and rates (n_knots, m) of each of these and the knot behind it.
+
+    Where the rates change evenly over an interval this is exactly the motion. At an impact, whose knots are at one time,
+    only a passed time of zero has a meaning.
+    """
+    call = _cubics(place.shape[1])
+    own_place, own_rate, own_time, own_knots, own_passed, *found = call.rows(len(time), len(knots))
+    own_place[:], own_rate[:], own_time[:] = place, rate, time
+    own_knots[:], own_passed[:] = knots, passed
+    call.run()
+    places, rates, changes = (each.copy() for each in found)
+    return places, rates, changes
 
 
-def joint_motions(
-    position: Array, velocity: Array, time: Array, knots: NDArray[np.int64]
-) -> JointMotion:
-    """Return the same between each of some knots and the one behind it."""
-    return JointMotion(
-        position[knots, 7:], position[knots + 1, 7:], velocity[knots, 6:], velocity[knots + 1, 6:],
-        (time[knots + 1] - time[knots])[:, None],
+@cache
+def _cubics(width: int) -> KernelOnRows:
+    """Return the call of ``cubic_motion`` for so many coordinates."""
+    return KernelOnRows(
+        cubic_motion,
+        lambda knots, n: (
+            np.zeros((knots, width)), np.zeros((knots, width)), np.zeros(knots), np.zeros(n, np.int64), np.zeros(n),
+            np.zeros((n, width)), np.zeros((n, width)), np.zeros((n, width)),
+        ),
     )  # fmt: skip
 
 
@@ -569,11 +538,12 @@ def half_steps(
     position: Array, velocity: Array, time: Array, force: Array, knots: NDArray[np.int64]
 ) -> Segments:
     """Return the intervals of a plan from its states at some knots, each in two steps."""
-    joints = joint_motions(position, velocity, time, knots)
-    quarters = np.arange(5)[:, None, None] * (0.25 * joints.duration)
-    angles, speeds, _ = (each.swapaxes(0, 1) for each in joints.at(np.asarray(quarters)))
+    lengths = time[knots + 1] - time[knots]
+    quarters = (np.arange(5) * (0.25 * lengths)[:, None]).ravel()
+    angles, speeds, _ = states_between(
+        position[:, 7:], velocity[:, 6:], time, np.repeat(knots, 5), quarters
+    )
     return Segments(
-        position[knots, :7], velocity[knots, :6],
-        angles.reshape(-1, angles.shape[2]), speeds.reshape(-1, speeds.shape[2]), force[knots],
-        np.repeat(0.5 * (time[knots + 1] - time[knots]), 2), np.full(len(knots), 2),
+        position[knots, :7], velocity[knots, :6], angles, speeds, force[knots],
+        np.repeat(0.5 * lengths, 2), np.full(len(knots), 2),
     )  # fmt: skip

@@ -145,7 +145,8 @@ class Draft:
         """Return what lies under ``key``, or under ``name`` in the mapping there; None where it cannot be read."""
         if self.whole is not None:
             found = getattr(self.whole, key)
-            return found if name is None else found[name]
+            part: ElementType | None = found if name is None else found[name]
+            return part
         value = self.data.get(key)
         return _read(kind, value if name is None else dict(self.entries(key))[name])
 

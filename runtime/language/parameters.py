@@ -168,19 +168,21 @@ class Parameters(BaseModel):
         if not isinstance(data, dict):
             return data
         converted = dict(data)
+        forms = _written_forms(cls)
         for name in data:
-            info = cls.model_fields.get(name)
-            if info is None:
-                continue
-            if converted[name] == "none" and takes_none(info):
+            unit, or_none = forms.get(name, ("", False))
+            if or_none and converted[name] == "none":
                 converted[name] = None
-            unit = unit_of(info)
             if unit:
-                with suppress(
-                    UnitError
-                ):  # stays a text, which pydantic then reports at its own place
+                with suppress(UnitError):  # stays a text, which pydantic then reports at its place
                     converted[name] = _convert(converted[name], unit)
         return converted
+
+
+@lru_cache(maxsize=1024)
+def _written_forms(params: type[Parameters]) -> Mapping[str, tuple[str, bool]]:
+    """Return the unit of each parameter, and whether ``none`` may stand for its null."""
+    return {n: (unit_of(info), takes_none(info)) for n, info in params.model_fields.items()}
 
 
 @lru_cache(maxsize=1024)
