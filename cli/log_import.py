@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 import yaml
 
@@ -29,9 +30,9 @@ if TYPE_CHECKING:
     from ..robots.robot_description import RobotDescription
 
 _WORDS: Mapping[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
-    "time": (("stamp", "time"), (1,)),
-    "angular_velocity": (("angular_velocity", "gyro", "omega"), (3,)),
-    "specific_force": (("specific_force", "linear_acceleration", "accel", "imuacc", "acc"), (3,)),
+    "time": (("stamp", "time", "t"), (1,)),
+    "angular_velocity": (("angular_velocity", "gyr", "omega", "w"), (3,)),
+    "specific_force": (("specific_force", "linear_acceleration", "acc", "a"), (3,)),
     "joint_position": (
         ("joint_position", "jointspos", "joint_states.position", "position", "pos", "q"),
         (),
@@ -56,6 +57,14 @@ _SIDES = {"l": "left", "lf": "left", "left": "left", "r": "right", "rf": "right"
 _CLOSES, _OPENS = 0.25, 0.2
 """Shares of the weight above which a foot's contact is closed, and below which it is opened."""
 _NUMBERED = re.compile(r"(?P<stem>.*?)[_\[]?(?P<number>\d+)\]?(?P<rest>\D*)")
+_AXES = (
+    re.compile(r"(.+?)([xyzw])(\)?)", re.IGNORECASE),
+    re.compile(r"((?:.*[^a-z])?)([xyzw])([^a-z].*)", re.IGNORECASE),
+)
+"""Names with an axis at their end, and with one that stands alone: `GyrX`, `acc_x_raw`."""
+_STAMP_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_STEPS = (1e-4, 0.1)
+"""Units of stamps [s]; between these are the steps of a log whose stamps' unit is guessed [s]."""
 
 Guess = str | list[str]
 """A column, or the columns of one number each, in order."""
@@ -98,11 +107,15 @@ def import_log(
         if target.exists() and not force:
             raise AloftError(f"{target} exists; --force overwrites it, --out names another")
         own_stamps = any(each.stamps is not None for each in found.arrays.values())
+        dates = [name for name, each in found.arrays.items() if each.unit in _STAMP_UNITS and widths[name] == 1]  # fmt: skip
+        if "time" not in guessed and dates:
+            guessed["time"] = dates[0]
         graph = graph_of(_beside(target, file), robot, guessed, own_stamps)
         played = graph["blocks"]["robot"]["with"]
         if own:
             played["joints"] = own
             guessed = {k: v for k, v in guessed.items() if not k.startswith("joint_")}
+            guessed |= {f"joint_{part}": own[part] for part in own if part != "names"}
         if described is not None and forces:
             weight = GRAVITY * described.total_mass
             played["contacts"] = {
@@ -114,7 +127,7 @@ def import_log(
                 for foot, column in forces.items()
             }
         guessed |= {f"force of {foot}": column for foot, column in forces.items()}
-        notes = _arrivals(found, played)
+        notes = _clock(found, played, guessed)
         named = LoggedJoints()
         if "joints" in played:
             try:
@@ -178,23 +191,47 @@ def _beside(graph: Path, file: Path) -> Path:
     return Path(os.path.relpath(file.resolve(), graph.parent.resolve()))
 
 
-def _arrivals(log: LogFile, played: dict[str, Any]) -> list[str]:
-    """Take stamps whose steps vary much for arrival times, and say so."""
-    from ..hal.log.columns import MOST_JITTER, LogClock, moments_of
+def _clock(log: LogFile, played: dict[str, Any], guessed: Mapping[str, Guess]) -> list[str]:
+    """Guess the unit of stamps that have none, and take those whose steps vary much for arrival times; say so."""
+    from ..hal.log.columns import MOST_APART, MOST_JITTER, LogClock, moments_of, usual_step
     from ..hal.log.log_file import LogError
+    from ..hal.log.series import GAP, Series
 
     if "clock" not in played:
         return []
-    rows = len(log.array(played["clock"]["stamps"]).values)
+    clock, notes = played["clock"], []
+    stamps = log.array(clock["stamps"])
+    step = usual_step(stamps.values[:, 0])
+    if stamps.unit is None and step > MOST_APART:
+        fits = [unit for unit, per in _STAMP_UNITS.items() if _STEPS[0] <= step * per < _STEPS[1]]
+        if fits:
+            clock["unit"] = fits[0]
+            rate = 1.0 / (step * _STAMP_UNITS[fits[0]])
+            notes.append(
+                f"the stamps are taken for {fits[0]}, {rate:.4g} rows a second (clock.unit)"
+            )
+    given = LogClock.model_validate(clock)
     try:
-        jitter = moments_of(log, LogClock.model_validate(played["clock"]), rows, None).jitter
+        times = moments_of(log, given, len(stamps.values), None).times
     except LogError as error:
-        return [str(error)]
-    if jitter <= MOST_JITTER:
-        return []
-    played["clock"]["even"] = True
+        return [*notes, str(error)]
+    # a table of several topics has numbers of each in some of its rows only, whose steps count
+    spreads = [Series(times, stamps.values).spread()]
+    for columns in guessed.values():
+        names = columns if isinstance(columns, list) else [columns]
+        arrays = [log.array(name).values for name in names]
+        if {len(each) for each in arrays} == {len(times)}:
+            rows = np.isfinite(np.hstack(arrays)).all(axis=1)
+            if rows.any():
+                spreads.append(Series(times[rows], stamps.values[rows]).spread())
+    even = given.model_copy(update={"even": True})
+    shift = moments_of(log, even, len(times), None).shift
+    if min(spreads) <= MOST_JITTER or shift > GAP * usual_step(times):  # rows are missing
+        return notes
+    clock["even"] = True
     return [
-        f"the steps between stamps vary by {100.0 * jitter:.0f} %: they are taken for arrival times, rows evenly apart (clock.even)"
+        *notes,
+        f"the steps between stamps vary by {100.0 * min(spreads):.0f} %: they are taken for arrival times, rows evenly apart (clock.even)",
     ]
 
 
@@ -202,9 +239,12 @@ def described_robot(robot: Path | None) -> RobotDescription | None:
     """Return a robot's description; ``None`` without one. Raises ``AloftError``."""
     if robot is None:
         return None
-    from ..robots.description import find_robot
+    from ..robots.description import RobotError, find_robot
 
-    return find_robot(str(robot))
+    try:
+        return find_robot(str(robot))
+    except (LookupError, RobotError) as error:
+        raise AloftError(f"--robot {robot}: {error.args[0]}") from error
 
 
 def forces_of_feet(widths: Mapping[str, int], robot: RobotDescription) -> dict[str, str]:
@@ -239,7 +279,8 @@ def guess(widths: Mapping[str, int], joints: Collection[int] = ()) -> dict[str, 
     Returns:
         The column, or the columns in order, by quantity.
     """
-    series = numbered(widths)
+    counted = numbered(widths)
+    series = {**of_axes(widths), **counted}
     known = {**widths, **{stem: len(columns) for stem, columns in series.items()}}
     guessed: dict[str, Guess] = {}
     for what, (words, allowed) in _WORDS.items():
@@ -247,7 +288,7 @@ def guess(widths: Mapping[str, int], joints: Collection[int] = ()) -> dict[str, 
         fitting = [
             name
             for name in sorted(free, key=_doubt)
-            if (known[name] in allowed if allowed else _of_joints(name, known, series, joints))
+            if (known[name] in allowed if allowed else _of_joints(name, known, counted, joints))
         ]
         column = _first(words, fitting)
         if column is not None:
@@ -270,6 +311,20 @@ def numbered(widths: Mapping[str, int]) -> dict[str, list[str]]:
     }  # fmt: skip
 
 
+def of_axes(widths: Mapping[str, int]) -> dict[str, list[str]]:
+    """Return the columns of one number for x, y, z, and w where there is one, by what their names share."""
+    found: dict[str, dict[str, str]] = {}
+    for name, width in widths.items():
+        for match in [match for form in _AXES if width == 1 and (match := form.fullmatch(name))]:
+            stem = match[1].rstrip("_/.( ") + match[3]
+            found.setdefault(stem, {})[match[2].lower()] = name
+    return {
+        stem: [columns[axis] for axis in "xyzw" if axis in columns]
+        for stem, columns in found.items()
+        if set("xyz") <= set(columns) and stem not in widths
+    }
+
+
 def _of_joints(
     name: str, widths: Mapping[str, int], series: Mapping[str, list[str]], joints: Collection[int]
 ) -> bool:
@@ -290,7 +345,8 @@ def _doubt(name: str) -> int:
 def _first(words: Iterable[str], names: list[str]) -> str | None:
     for word in words:
         for name in names:
-            if word in name.lower() if len(word) > 2 else word == name.lower():
+            plain = name.lower().replace("/", ".")
+            if word in plain if len(word) > 2 else word == plain:
                 return name
     return None
 

@@ -183,9 +183,9 @@ def _guessed(
         names,
         [Named(label, g.joint, g.sure, g.why) for label, g in zip(labels, guesses, strict=True)],
     )
-    if not any(motion.closed.any() for motion in motions.values()):
+    if robot.feet and not any(motion.closed.any() for motion in motions.values()):
         found.notes.append("no contacts of feet were found, which would tell the legs' columns")
-    elif set(motions) == {""}:
+    elif robot.feet and set(motions) == {""}:
         found.notes.append(
             "neither an IMU nor motion capture was found, so only standing on two feet tells the legs' columns"
         )

@@ -342,9 +342,9 @@ def plan_task(
 ) -> dict[str, Any]:  # fmt: skip
     """Plan one task, print and draw the plan, and return its row. Without ``tests`` those of a valid
     plan are not printed."""
-    from ...planner.checking.validity import InvalidPlanError
     from ...planner.solving.solver_process import cpu_time
     from ...planner.task.files import PlanError
+    from ...planner.task.plan import InvalidPlanError
 
     robot, started = library.robot, cpu_time()
     try:

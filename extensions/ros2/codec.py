@@ -276,6 +276,8 @@ class MessageType:
 
 Values = Mapping[str, NDArray[Any]]
 _OTHER = {"byte": "uint8", "octet": "uint8", "char": "uint8"}
+_OCTETS = ("byte", "octet")
+"""Numbers from 0 to 255 that rosbags takes for signed ones (findings/ros2_byte_and_char_in_two_readers.sh)."""
 CDR_HEADER = 4
 """Bytes before the message itself, which say how it is encoded."""
 
@@ -450,6 +452,8 @@ class Codec:
         if leaf.parts:
             value = [getattr(value, part) for part in leaf.parts]
         value = np.asarray(value, leaf.dtype)
+        if leaf.base in _OCTETS:
+            value &= 0xFF
         return unit_quaternions(value, ".".join(leaf.path)) if leaf.parts == "xyzw" else value
 
     def _rank(self, message: Any) -> NDArray[np.int64] | None:
@@ -564,5 +568,7 @@ def _put(owner: Any, leaf: Leaf, value: NDArray[Any]) -> None:
         value = np.clip(value, max(limits.min, -(2**63)), min(limits.max, 2**63 - 1))
     if value.ndim:
         np.copyto(getattr(owner, name), value, casting="unsafe")
+    elif leaf.base in _OCTETS:
+        setattr(owner, name, value.astype(np.int8).item())
     else:
         setattr(owner, name, value.item())

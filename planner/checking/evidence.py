@@ -7,7 +7,7 @@ as the task says, with a step where the task has one. Everything is vectorised o
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,11 +17,17 @@ from numpy.typing import NDArray
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import Motors, RobotDescription
-from ...robots.kinematics import LinkPoses
 from ...robots.welding import welded
 from ..models.euler_angles import euler_angles
 from ..models.exact_dynamics import dynamics_of
-from ..models.link_shapes import arms, clearance_deficit, gaps_between, legs, moving_shapes
+from ..models.link_shapes import (
+    MovingShape,
+    arms,
+    clearance_deficit,
+    gaps_between,
+    legs,
+    moving_shapes,
+)
 from ..models.robot_model import model_of, stances_of
 from ..models.symmetry import mirrored_pairs, symmetrised
 from ..task.phase import Phase
@@ -66,19 +72,22 @@ def ground_height(
     return np.asarray(found)
 
 
+Shapes = Mapping[str, Sequence[MovingShape]]
+"""The shapes of every link, by its name; see ``moving_shapes``."""
+
+
 def body_heights(
-    robot: RobotDescription, task: JumpTask, poses: LinkPoses, progress: Array
+    robot: RobotDescription, task: JumpTask, shapes: Shapes, progress: Array
 ) -> dict[str, Array]:
     """Return by link, except for soles, the lowest height [m] of its shapes above the ground, (n,).
 
-    Balls along their edges stand for them, close enough that no edge of a step passes between two. Where
-    the ground has edges, a ball's height is that of its lower side above the ground right below it. What a foot
-    that is a ball covers of its leg does not count.
+    Balls at their corners stand for them. Where the ground has edges these are balls along the shapes' edges, close
+    enough that no edge of a step passes between two, and a ball's height is that of its lower side above the ground
+    right below it. What a foot that is a ball covers of its leg does not count.
     """
     feet = {foot.link for foot in robot.feet}
     ends = {robot.feet[ball.foot].link: ball for ball in ball_feet(robot) if ball.radius}
     uneven = task.leans or any(hop.landing_height or hop.gap for hop in task.hops())
-    shares = np.linspace(0.0, 1.0, BALLS if uneven else 2)[:, None, None]
     aside = np.linspace(-0.95, 0.95, 7)[:, None, None]
     found = {}
     for link in robot.links:
@@ -86,15 +95,11 @@ def body_heights(
         if (link.name in feet and ball is None) or not link.shapes:
             continue
         heights = []
-        shapes = moving_shapes(robot, poses, link.name)
-        for radius, (start, stop) in (
-            (each.shape.radius, edge) for each in shapes for edge in each.edges()
-        ):
-            centres = start + shares * (stop - start)
+        for each, centres in ((e, line) for e in shapes[link.name] for line in _balls(e, uneven)):
+            radius = each.shape.radius
             if ball is not None:
-                position, rotation = poses.of(link.name)
                 apart = np.linalg.norm(
-                    centres[:, 0] - position[0] - rotation[0] @ ball.centre, axis=1
+                    centres[:, 0] - each.position[0] - each.rotation[0] @ ball.centre, axis=1
                 )
                 centres = centres[apart > ball.radius + radius]
                 if not len(centres):
@@ -111,8 +116,18 @@ def body_heights(
     return found
 
 
+def _balls(shape: MovingShape, along: bool) -> list[Array]:
+    """Return the centres of the balls that stand for a shape: at its corners, or ``along`` each of its edges,
+    (n_balls, n, 3).
+    """
+    if not along:
+        return [shape.corners]
+    shares = np.linspace(0.0, 1.0, BALLS)[:, None, None]
+    return [start + shares * (stop - start) for start, stop in shape.edges()]
+
+
 def arm_clearance_deficit(
-    robot: RobotDescription, poses: LinkPoses, wanted: float
+    robot: RobotDescription, shapes: Shapes, wanted: float
 ) -> tuple[Array, str] | None:
     """Return the same as ``leg_clearance_deficit`` between each of the ``arms`` and all that is no part of it; and which link lacks
     most. ``None`` where no arm has shapes that could touch.
@@ -125,10 +140,9 @@ def arm_clearance_deficit(
             for other in robot.links:
                 if other.name in arm:
                     continue
-                own, others = (moving_shapes(robot, poses, name) for name in (link, other.name))
-                if not (own and others):
+                if not (shapes[link] and shapes[other.name]):
                     continue
-                near = gaps_between(own, others)
+                near = gaps_between(shapes[link], shapes[other.name])
                 found = clearance_deficit(near, wanted, 0, carried=other.name == parent[link])
                 lack = found if lack is None else np.maximum(lack, found)
                 if found.max() > most:
@@ -136,23 +150,20 @@ def arm_clearance_deficit(
     return None if lack is None else (lack, worst_link)
 
 
-def leg_clearance_deficit(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array | None:
+def leg_clearance_deficit(robot: RobotDescription, shapes: Shapes, wanted: float) -> Array | None:
     """Return the distance [m] by which the links of different legs are closer than ``wanted``, or than at the first
     instant where they stand closer than that, the worst at each instant (n,); ``None`` where no two legs have shapes.
     """
     lack: Array | None = None
-    for gap in _gaps(robot, poses):
+    for gap in _gaps(robot, shapes):
         found = clearance_deficit(gap, wanted, 0)
         lack = found if lack is None else np.maximum(lack, found)
     return lack
 
 
-def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:
+def _gaps(robot: RobotDescription, shapes: Shapes) -> Iterator[Array]:
     """Yield the distances (pairs, n) between all shapes of one leg and all of another."""
-    chains = [
-        [shape for link in chain for shape in moving_shapes(robot, poses, link)]
-        for chain in legs(robot)
-    ]
+    chains = [[shape for link in chain for shape in shapes[link]] for chain in legs(robot)]
     for number, chain in enumerate(chains):
         for other in chains[number + 1 :]:
             if chain and other:
@@ -243,9 +254,10 @@ class Evidence:
         )
 
     @cached_property
-    def poses(self) -> LinkPoses:
-        """The links at the samples."""
-        return dynamics_of(self.robot).link_poses(self.replay.samples.position)
+    def shapes(self) -> Shapes:
+        """The links' shapes at the samples."""
+        poses = dynamics_of(self.robot).link_poses(self.replay.samples.position)
+        return moving_shapes(self.robot, poses)
 
     @cached_property
     def progress(self) -> Array:

@@ -23,8 +23,8 @@ from ..models.exact_dynamics import (
     Segments,
     dynamics_of,
     half_steps,
-    joint_motions,
     rotation_between,
+    states_between,
 )
 from ..task.phase import Phase
 from ..task.plan import PlannedJump
@@ -174,8 +174,9 @@ def _flight(plan: PlannedJump, lift_off: int, touchdown: int) -> _Flight:
         times.append(plan.time[k] + step * np.arange(1, count + 1))
         knots += [k] * count
     of_halves = np.concatenate([[lift_off], np.repeat(knots, 2)])
-    joints = joint_motions(plan.position, plan.velocity, plan.time, of_halves)
-    angles, speeds, _ = joints.at(np.concatenate(passed)[:, None])
+    angles, speeds, _ = states_between(
+        plan.position[:, 7:], plan.velocity[:, 6:], plan.time, of_halves, np.concatenate(passed)
+    )
     first = slice(lift_off, lift_off + 1)
     segments = Segments(
         plan.position[first, :7], plan.velocity[first, :6], angles, speeds,
@@ -229,10 +230,10 @@ def _sample(
     instant = np.concatenate([plan.time, time])[order]
     position = np.concatenate([plan.position, places])[order]
     velocity = np.concatenate([plan.velocity, rates])[order]
-    joints = joint_motions(plan.position, plan.velocity, plan.time, interval)
-    lasts = np.asarray(joints.duration > 0.0)
-    joints = joints._replace(duration=np.where(lasts, joints.duration, 1.0))
-    bend = joints.at((instant - plan.time[interval])[:, None])[2]
+    _, _, bend = states_between(
+        plan.position[:, 7:], plan.velocity[:, 6:], plan.time, interval, instant - plan.time[interval]
+    )  # fmt: skip
+    lasts = (plan.time[interval + 1] > plan.time[interval])[:, None]
     force = np.where(lasts[:, :, None], plan.contact_force[interval], 0.0)
     terms = dynamics.motion(position, velocity, bend, force)
     contacts = force.shape[1]

@@ -24,21 +24,19 @@ from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
 from ..checking.replay import flight_knots
 from ..models.euler_angles import (
-    angular_motion,
-    euler_angles,
-    euler_rates,
+    ORDER,
+    coordinates_of,
     rotation,
     times,
-    times_transposed,
+    twist_of,
     unwrapped,
 )
 from ..models.exact_dynamics import (
     AFTER,
     BEFORE,
     ExactDynamics,
-    JointMotion,
     dynamics_of,
-    joint_motions,
+    states_between,
 )
 from ..task.phase import Phase
 from ..task.plan import PlannedJump
@@ -152,7 +150,7 @@ def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, fl
     position, velocity = plan.position[knot], plan.velocity[knot]
     bend = plan.acceleration[knot, 3:]
     position[between], velocity[between], bend[between] = _between(
-        plan, dynamics, knot[between], passed[between, None]
+        plan, dynamics, knot[between], passed[between]
     )
     still = np.zeros((1, plan.velocity.shape[1] - 3))
     return _States(
@@ -167,27 +165,18 @@ def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, fl
 def _between(
     plan: PlannedJump, dynamics: ExactDynamics, knot: NDArray[np.int64], passed: Array
 ) -> tuple[Array, Array, Array]:
-    """Return Pinocchio's q and v at those times (n, 1) since knots, and the accelerations of ``_States``: the cubics of
+    """Return Pinocchio's q and v at those times since knots, both (n,), and the accelerations of ``_States``: the cubics of
     base position, Euler angles and joints between two knots.
     """
-    angles = euler_angles(plan.position[:, 3:7])
-    turns = matrices_of_quaternions(plan.position[:, 3:7])
-    places = np.hstack([plan.position[:, :3], angles])
-    rates = np.hstack(
-        [times(turns, plan.velocity[:, :3]), euler_rates(angles, plan.velocity[:, 3:6])]
-    )
-    length = (plan.time[knot + 1] - plan.time[knot])[:, None]
-    base = JointMotion(places[knot], places[knot + 1], rates[knot], rates[knot + 1], length)
-    place, rate, bend = base.at(passed)
-    joints = joint_motions(plan.position, plan.velocity, plan.time, knot).at(passed)
-    turn = rotation(place[:, 3:])
-    spin, bent = angular_motion(place[:, 3:], rate[:, 3:], bend[:, 3:])
-    quaternions = pinocchio_quaternions(dynamics.pin, turn)
+    q, v = coordinates_of(plan.position, plan.velocity)
+    # The plan's own matrices: a matrix of the angles has other last bits.
+    v[:, :3] = times(matrices_of_quaternions(plan.position[:, 3:7]), plan.velocity[:, :3])
+    place, rate, bend = states_between(q, v, plan.time, knot, passed)
+    velocity, acceleration = twist_of(place, rate, bend)
+    quaternions = pinocchio_quaternions(dynamics.pin, rotation(place[:, 3:6][:, ORDER]))
     return (
-        np.hstack([place[:, :3], quaternions, joints[0]]),
-        np.hstack([times_transposed(turn, rate[:, :3]), spin, joints[1]]),
-        np.hstack([bent, joints[2]]),
-    )
+        np.hstack([place[:, :3], quaternions, place[:, 6:]]), velocity, acceleration[:, 3:],
+    )  # fmt: skip
 
 
 def pinocchio_quaternions(pin: Any, turns: Array) -> Array:

@@ -94,8 +94,8 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
     assembly, coordinates, model = problem.assembly, problem.coordinates, problem.exact
     n, count = coordinates.size, problem.knots
     times = knot_times(problem, values)
-    q = np.array([values[s : s + n] for s in assembly.state_start]) @ coordinates.matrix.T
-    v = np.array([values[s + n : s + 2 * n] for s in assembly.state_start]) @ coordinates.matrix.T
+    states = values[assembly.state_start[:, None] + np.arange(2 * n)]
+    q, v = states[:, :n] @ coordinates.matrix.T, states[:, n:] @ coordinates.matrix.T
     bend, force = np.zeros((count, model.size)), np.zeros((count, 3 * len(model.robot.contacts)))
     grounded = np.zeros((count, len(model.robot.contacts)), dtype=bool)
     impacts = np.zeros(count, dtype=bool)
@@ -255,7 +255,7 @@ def pack(problem: FullProblem, plan: PlannedJump, guess: Array | None = None) ->
 
 _evaluators: dict[tuple[int, int], tuple[SymbolicModel, tuple[Lanes, ...]]] = {}
 KEPT = 32
-"""Evaluators that are kept, of a model and a number of instants."""
+"""Evaluators that are kept, of a model and a number of instants, and functions of models."""
 
 
 def _evaluate(
@@ -298,6 +298,8 @@ def _functions(model: SymbolicModel, pushed: int) -> tuple[Any, Any]:
     import casadi as ca
 
     if id(model) not in _of_models:
+        if len(_of_models) >= KEPT:
+            _of_models.clear()
         place, rate, bend_of = (ca.SX.sym(name, model.size) for name in ("q", "v", "a"))
         pushes = ca.SX.sym("F", pushed)
         whole = centroidal_momentum(model, place, rate)

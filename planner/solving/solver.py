@@ -13,6 +13,7 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ..problem.assembly import Assembly, NonlinearProgram
+from ..problem.program_functions import program_functions
 from .solver_process import call_bounded, call_solver, cpu_time, without_output
 
 VIOLATION = 1e-6
@@ -143,7 +144,7 @@ class Solver:
 
     def __init__(self, assembly: Assembly, name: str, barrier: float, limit: int) -> None:
         self._made_of = (assembly, name, barrier, limit)
-        self._functions = assembly.functions(upper=name != "fatrop")
+        self._functions = program_functions(assembly, upper=name != "fatrop")
         self.cost, self.constraints = self._functions["nlp_f"], self._functions["nlp_g"]
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -33,6 +33,15 @@ class PlanFileError(AloftError, ValueError):
     """A file is no plan, or one of another format."""
 
 
+class InvalidPlanError(AloftError):
+    """A plan failed the validity check; the message names the tests that failed. ``plan`` is that
+    plan with its report, to look at and not to run."""
+
+    def __init__(self, message: str, plan: PlannedJump) -> None:
+        super().__init__(message)
+        self.plan = plan
+
+
 @dataclass(frozen=True)
 class PlannedJump:
     """A planned jump over N knots.
