@@ -88,8 +88,7 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
     Raises:
         ValueError: it has not one flight for every jump of its task.
     """
-    dynamics, flights = dynamics_of(robot), flight_knots(plan)
-    lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
+    dynamics, flights, lasting = dynamics_of(robot), flight_knots(plan), plan.lasting
     flown = [_flight(plan, lift_off, touchdown) for lift_off, touchdown in flights]
     single = half_steps(plan.position, plan.velocity, plan.time, plan.contact_force, lasting)
     places, rates = dynamics.follow(Segments.joined([*(one.segments for one in flown), single]))
@@ -105,12 +104,12 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
         k: dynamics.velocity_after_impact(
             plan.position[k], plan.velocity[k], plan.contact_force[k], held_joints(plan, k)
         )
-        for k in np.flatnonzero(np.diff(plan.time) <= 0.0).tolist()
+        for k in np.flatnonzero(plan.steps <= 0.0).tolist()
     }
     defect = _defects(plan, impacts, lasting, places[first + 1 :: 2], rates[first + 1 :: 2])
     gap, wrench = midpoint_residuals(plan, dynamics)
     grounded = ~np.isin(lasting, np.concatenate([np.arange(*flight) for flight in flights]))
-    half = 0.5 * np.diff(plan.time)[lasting[grounded]]
+    half = 0.5 * plan.steps[lasting[grounded]]
     samples, terms, knots = _sample(
         plan, dynamics,
         np.concatenate([*(one.time for one in flown), plan.time[lasting[grounded]] + half]),
@@ -136,7 +135,7 @@ def flight_knots(plan: PlannedJump) -> tuple[tuple[int, int], ...]:
     Raises:
         ValueError: there are more or fewer flights than jumps.
     """
-    flying = np.flatnonzero((plan.phase[:-1] == Phase.FLIGHT) & (np.diff(plan.time) > 0.0))
+    flying = np.flatnonzero((plan.phase[:-1] == Phase.FLIGHT) & (plan.steps > 0.0))
     found = [
         (int(run[0]), int(run[-1]) + 1)
         for run in np.split(flying, np.flatnonzero(np.diff(flying) > 1) + 1)
@@ -255,8 +254,8 @@ def midpoint_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> tuple[Arra
     """
     places, rates = coordinates_of(plan.position, plan.velocity)
     gap, wrench = np.zeros(len(plan.time) - 1), np.zeros(len(plan.time) - 1)
-    k = np.flatnonzero(np.diff(plan.time) > 0.0)
-    h = np.diff(plan.time)[k][:, None]
+    k = plan.lasting
+    h = plan.steps[k][:, None]
     bend = (rates[k + 1] - rates[k]) / h
     gap[k] = np.abs(places[k + 1] - places[k] - 0.5 * h * (rates[k] + rates[k + 1])).max(axis=1)
     middle = places[k] + 0.5 * h * rates[k] + 0.125 * h * h * bend
