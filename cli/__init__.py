@@ -10,7 +10,6 @@ import os
 import sys
 import threading
 from collections.abc import Iterable
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
