@@ -107,7 +107,10 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
     }
     defect = _defects(plan, impacts, lasting, places[first + 1 :: 2], rates[first + 1 :: 2])
     gap, wrench = midpoint_residuals(plan, dynamics)
-    grounded = ~np.isin(lasting, np.concatenate([np.arange(*flight) for flight in flights]))
+    flying = np.zeros(len(plan.steps), np.bool_)
+    for lift_off, touchdown in flights:
+        flying[lift_off:touchdown] = True
+    grounded = ~flying[lasting]
     half = 0.5 * plan.steps[lasting[grounded]]
     samples, terms, knots = _sample(
         plan, dynamics,
