@@ -64,9 +64,29 @@ def pytest_collection_finish() -> None:
     """Exempt what is collected from searches for garbage: every paced run makes one before it starts,
     which would take half a second among the modules of all tests. And cache no bytecode from here on:
     tests write blocks anew within the second and with the length by which Python tells old from new."""
-    gc.freeze()
+    _freeze()
     sys.dont_write_bytecode = True
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
+    """Exempt what the tests of a file have imported, too: the libraries that only some tests need have
+    more objects than all the others together."""
+    if nextitem is None or nextitem.path == item.path or len(sys.modules) < _modules + 100:
+        return
+    gc.collect()
+    _freeze()
+
+
+_modules = 0
+"""The number of modules when objects were frozen last."""
+
+
+def _freeze() -> None:
+    global _modules
+    gc.freeze()
+    _modules = len(sys.modules)
 
 
 @pytest.hookimpl(wrapper=True, optionalhook=True)

@@ -204,6 +204,9 @@ UNUSED = {
     "aloft.mathematics.segment_distances.segment_gap": tuple(NORMAL((4, 3))),
     "aloft.mathematics.segment_distances.capsule_gaps": (*CAPSULES, *CAPSULES, np.zeros((4, 3))),
     "aloft.mathematics.elementary.hypot": (0.3, -0.4),
+    "aloft.mathematics.interpolation.cubic_motion": (
+        *NORMAL((2, 4, 3)), np.array([0.0, 0.1, 0.1, 0.3]), np.array([0, 1, 2]), np.array([0.05, 0.0, 0.1]), *np.zeros((3, 3, 3)),
+    ),
     "aloft.mathematics.euler_motion.euler_matrix": (*NORMAL((2, 3)), np.zeros((3, 3))),
     "aloft.mathematics.euler_motion.turn_ahead": (NORMAL((3, 3)), NORMAL(6), np.zeros(3)),
     "aloft.mathematics.euler_motion.turn_back": (NORMAL((3, 3)), NORMAL(6), np.zeros(3)),

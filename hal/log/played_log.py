@@ -61,7 +61,7 @@ class _Player:
         try:
             yield
         except LogError as error:
-            self.played.problems.append(LogProblem(str(error), parameter))
+            self.played.problems.append(LogProblem(str(error), parameter, fix=error.fix))
 
     def take(
         self, columns: Any, units: Units, parameter: str, count: int | None = None
@@ -281,7 +281,6 @@ def _contacts(player: _Player) -> tuple[dict[int, Series], dict[int, Series]]:
                     fix=near[0] if near else "",
                 )
             )
-            continue
         if (given.force is None) == (given.closed is None):
             player.played.problems.append(
                 LogProblem(f"foot {name} needs either a force or closed", f"contacts.{name}")
@@ -302,7 +301,7 @@ def _contacts(player: _Player) -> tuple[dict[int, Series], dict[int, Series]]:
             told = isinstance(columns, LogColumns) and columns.unit is not None  # of all six alike
             units = {1: ["N"], 6: ["N"] * 6 if told else ["N"] * 3 + ["N m"] * 3}
         series = player.take(columns, units, f"contacts.{name}")
-        if series is not None:
+        if series is not None and name in feet:
             flags = series.values[:, 0] != 0.0
             if given.force is not None:
                 forces[feet.index(name)] = series

@@ -241,17 +241,11 @@ class Evidence:
     def middles(self) -> NDArray[np.int64]:
         """The sample nearest to the middle of every interval that lasts."""
         time, samples = self.plan.time, self.replay.samples
-        lasting = np.flatnonzero(np.diff(time) > 0.0)
-        first = np.searchsorted(samples.knot, lasting)
-        behind = np.searchsorted(samples.knot, lasting, side="right")
-        middle = 0.5 * (time[lasting] + time[lasting + 1])
-        return np.array(
-            [
-                i + int(np.abs(samples.time[i:j] - m).argmin())
-                for i, j, m in zip(first.tolist(), behind.tolist(), middle.tolist(), strict=True)
-            ],
-            np.int64,
-        )
+        apart = np.abs(samples.time - (0.5 * (time[:-1] + time[1:]))[samples.knot])
+        first = np.searchsorted(samples.knot, np.arange(len(time) - 1))
+        nearest = np.flatnonzero(apart == np.minimum.reduceat(apart, first)[samples.knot])
+        found = nearest[np.searchsorted(nearest, first)]
+        return np.asarray(found[self.plan.lasting], np.int64)
 
     @cached_property
     def shapes(self) -> Shapes:
@@ -354,7 +348,7 @@ class Evidence:
 
     def figures(self) -> dict[str, float]:
         """Return the plan's performance and loads, by name with unit."""
-        r, lasting = self.replay, np.diff(self.plan.time) > 0.0
+        r, lasting = self.replay, self.plan.lasting
         force = self.plan.contact_force[:-1][lasting].sum(axis=1)[:, 2]
         k = r.flights[0][0]
         return {

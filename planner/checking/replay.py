@@ -23,8 +23,8 @@ from ..models.exact_dynamics import (
     Segments,
     dynamics_of,
     half_steps,
-    joint_motions,
     rotation_between,
+    states_between,
 )
 from ..task.phase import Phase
 from ..task.plan import PlannedJump
@@ -88,8 +88,7 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
     Raises:
         ValueError: it has not one flight for every jump of its task.
     """
-    dynamics, flights = dynamics_of(robot), flight_knots(plan)
-    lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
+    dynamics, flights, lasting = dynamics_of(robot), flight_knots(plan), plan.lasting
     flown = [_flight(plan, lift_off, touchdown) for lift_off, touchdown in flights]
     single = half_steps(plan.position, plan.velocity, plan.time, plan.contact_force, lasting)
     places, rates = dynamics.follow(Segments.joined([*(one.segments for one in flown), single]))
@@ -105,12 +104,12 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
         k: dynamics.velocity_after_impact(
             plan.position[k], plan.velocity[k], plan.contact_force[k], held_joints(plan, k)
         )
-        for k in np.flatnonzero(np.diff(plan.time) <= 0.0).tolist()
+        for k in np.flatnonzero(plan.steps <= 0.0).tolist()
     }
     defect = _defects(plan, impacts, lasting, places[first + 1 :: 2], rates[first + 1 :: 2])
     gap, wrench = midpoint_residuals(plan, dynamics)
     grounded = ~np.isin(lasting, np.concatenate([np.arange(*flight) for flight in flights]))
-    half = 0.5 * np.diff(plan.time)[lasting[grounded]]
+    half = 0.5 * plan.steps[lasting[grounded]]
     samples, terms, knots = _sample(
         plan, dynamics,
         np.concatenate([*(one.time for one in flown), plan.time[lasting[grounded]] + half]),
@@ -136,7 +135,7 @@ def flight_knots(plan: PlannedJump) -> tuple[tuple[int, int], ...]:
     Raises:
         ValueError: there are more or fewer flights than jumps.
     """
-    flying = np.flatnonzero((plan.phase[:-1] == Phase.FLIGHT) & (np.diff(plan.time) > 0.0))
+    flying = np.flatnonzero((plan.phase[:-1] == Phase.FLIGHT) & (plan.steps > 0.0))
     found = [
         (int(run[0]), int(run[-1]) + 1)
         for run in np.split(flying, np.flatnonzero(np.diff(flying) > 1) + 1)
@@ -174,8 +173,9 @@ def _flight(plan: PlannedJump, lift_off: int, touchdown: int) -> _Flight:
         times.append(plan.time[k] + step * np.arange(1, count + 1))
         knots += [k] * count
     of_halves = np.concatenate([[lift_off], np.repeat(knots, 2)])
-    joints = joint_motions(plan.position, plan.velocity, plan.time, of_halves)
-    angles, speeds, _ = joints.at(np.concatenate(passed)[:, None])
+    angles, speeds, _ = states_between(
+        plan.position[:, 7:], plan.velocity[:, 6:], plan.time, of_halves, np.concatenate(passed)
+    )
     first = slice(lift_off, lift_off + 1)
     segments = Segments(
         plan.position[first, :7], plan.velocity[first, :6], angles, speeds,
@@ -229,10 +229,10 @@ def _sample(
     instant = np.concatenate([plan.time, time])[order]
     position = np.concatenate([plan.position, places])[order]
     velocity = np.concatenate([plan.velocity, rates])[order]
-    joints = joint_motions(plan.position, plan.velocity, plan.time, interval)
-    lasts = np.asarray(joints.duration > 0.0)
-    joints = joints._replace(duration=np.where(lasts, joints.duration, 1.0))
-    bend = joints.at((instant - plan.time[interval])[:, None])[2]
+    _, _, bend = states_between(
+        plan.position[:, 7:], plan.velocity[:, 6:], plan.time, interval, instant - plan.time[interval]
+    )  # fmt: skip
+    lasts = (plan.time[interval + 1] > plan.time[interval])[:, None]
     force = np.where(lasts[:, :, None], plan.contact_force[interval], 0.0)
     terms = dynamics.motion(position, velocity, bend, force)
     contacts = force.shape[1]
@@ -254,8 +254,8 @@ def midpoint_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> tuple[Arra
     """
     places, rates = coordinates_of(plan.position, plan.velocity)
     gap, wrench = np.zeros(len(plan.time) - 1), np.zeros(len(plan.time) - 1)
-    k = np.flatnonzero(np.diff(plan.time) > 0.0)
-    h = np.diff(plan.time)[k][:, None]
+    k = plan.lasting
+    h = plan.steps[k][:, None]
     bend = (rates[k + 1] - rates[k]) / h
     gap[k] = np.abs(places[k + 1] - places[k] - 0.5 * h * (rates[k] + rates[k + 1])).max(axis=1)
     middle = places[k] + 0.5 * h * rates[k] + 0.125 * h * h * bend

@@ -35,8 +35,8 @@ from ..models.exact_dynamics import (
     AFTER,
     BEFORE,
     ExactDynamics,
-    JointMotion,
     dynamics_of,
+    states_between,
 )
 from ..task.phase import Phase
 from ..task.plan import PlannedJump
@@ -140,7 +140,7 @@ class _States(NamedTuple):
 def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, float]) -> _States:
     """Return the motion, knots and what lies between them; two rows at an impact."""
     last = len(plan.time) - 1
-    lengths = np.diff(plan.time)
+    lengths = plan.steps
     longest = [steps.get(Phase(phase), STEP) for phase in plan.phase[:-1].tolist()]
     counts = np.maximum(np.ceil(lengths / longest - 1e-9), 1.0).astype(np.int64)
     knot = np.repeat(np.arange(last), counts)
@@ -150,7 +150,7 @@ def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, fl
     position, velocity = plan.position[knot], plan.velocity[knot]
     bend = plan.acceleration[knot, 3:]
     position[between], velocity[between], bend[between] = _between(
-        plan, dynamics, knot[between], passed[between, None]
+        plan, dynamics, knot[between], passed[between]
     )
     still = np.zeros((1, plan.velocity.shape[1] - 3))
     return _States(
@@ -165,14 +165,13 @@ def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, fl
 def _between(
     plan: PlannedJump, dynamics: ExactDynamics, knot: NDArray[np.int64], passed: Array
 ) -> tuple[Array, Array, Array]:
-    """Return Pinocchio's q and v at those times (n, 1) since knots, and the accelerations of ``_States``: the cubics of
+    """Return Pinocchio's q and v at those times since knots, both (n,), and the accelerations of ``_States``: the cubics of
     base position, Euler angles and joints between two knots.
     """
     q, v = coordinates_of(plan.position, plan.velocity)
     # The plan's own matrices: a matrix of the angles has other last bits.
     v[:, :3] = times(matrices_of_quaternions(plan.position[:, 3:7]), plan.velocity[:, :3])
-    length = (plan.time[knot + 1] - plan.time[knot])[:, None]
-    place, rate, bend = JointMotion(q[knot], q[knot + 1], v[knot], v[knot + 1], length).at(passed)
+    place, rate, bend = states_between(q, v, plan.time, knot, passed)
     velocity, acceleration = twist_of(place, rate, bend)
     quaternions = pinocchio_quaternions(dynamics.pin, rotation(place[:, 3:6][:, ORDER]))
     return (
@@ -202,21 +201,21 @@ def _middle_values(
     """Return what the intervals' values (n_knots, m) are at instants in those intervals: linear from one middle to the
     next, never across lift-off or touchdown.
     """
-    lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
+    lasting = plan.lasting
     ends = np.array([knot for flight in flight_knots(plan) for knot in flight])
-    found = np.empty((len(instants), values.shape[1]))
+    middles = 0.5 * (plan.time[lasting] + plan.time[lasting + 1])
+    # Each instant lies between two middles of its own group: what is before, between or behind those ends.
+    bounds = np.concatenate([[0], np.searchsorted(lasting, ends), [len(lasting)]])
     number = np.searchsorted(ends, intervals, side="right")
-    for k, group in enumerate(np.split(lasting, np.searchsorted(lasting, ends))):
-        here = np.flatnonzero(number == k)
-        middles = 0.5 * (plan.time[group] + plan.time[group + 1])
-        after = np.searchsorted(middles, instants[here])
-        outside = (after == 0) | (after == len(middles))
-        found[here] = values[group[np.minimum(after, len(middles) - 1)]]
-        here, after = here[~outside], after[~outside]
-        share = (instants[here] - middles[after - 1]) / (middles[after] - middles[after - 1])
-        first, second = values[group[after - 1]], values[group[after]]
-        found[here] = first + share[:, None] * (second - first)
-    return found
+    first, stop = bounds[number], bounds[number + 1]
+    after = np.clip(np.searchsorted(middles, instants), first, stop)
+    found = values[lasting[np.minimum(after, stop - 1)]]
+    inside = np.flatnonzero((after > first) & (after < stop))
+    after = after[inside]
+    share = (instants[inside] - middles[after - 1]) / (middles[after] - middles[after - 1])
+    before = values[lasting[after - 1]]
+    found[inside] = before + share[:, None] * (values[lasting[after]] - before)
+    return np.asarray(found)
 
 
 def _rows(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str, Array]:

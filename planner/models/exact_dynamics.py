@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from ...mathematics.arrays import Array
 from ...mathematics.body_dynamics import body_motion
 from ...mathematics.compiling.kernel_on_rows import KernelOnRows
 from ...mathematics.constants import GRAVITY
+from ...mathematics.interpolation import cubic_motion
 from ...mathematics.pushed_motion import (
     PushedTurns,
     SeenMotion,
@@ -47,35 +48,9 @@ from .euler_angles import times, times_transposed
 WHOLE = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]
 """Places of the parts xx, yy, zz, xy, xz, yz of an inertia in its matrix."""
 Motion = tuple[Array, Array, Array]
-"""Joint angles, velocities and accelerations."""
+"""Places, rates and the rates' changes."""
 AFTER, BEFORE = [1, 2, 0], [2, 0, 1]
 """The axes after and before each one: for cross products, which NumPy's own makes slowly."""
-
-
-class JointMotion(NamedTuple):
-    """The joints between two knots: the cubics through both ends' angles and velocities. Between many
-    pairs of knots at once all of it has a row for each, the durations (n, 1).
-
-    Where the plan's joint acceleration is constant over the interval this is exactly its motion.
-    """
-
-    start: Array
-    end: Array
-    start_velocity: Array
-    end_velocity: Array
-    duration: float | Array
-
-    def at(self, time: float | Array) -> Motion:
-        """Return the angles, velocities and accelerations [rad] at ``time`` since the first knot [s]; at n times (n, 1)
-        each is (n, n_joints).
-        """
-        t, u = self.duration, time / self.duration
-        way = self.end - self.start
-        bend = 3.0 * way - t * (2.0 * self.start_velocity + self.end_velocity)
-        twist = t * (self.start_velocity + self.end_velocity) - 2.0 * way
-        position = self.start + u * (t * self.start_velocity + u * (bend + u * twist))
-        velocity = self.start_velocity + u / t * (2.0 * bend + 3.0 * u * twist)
-        return position, velocity, (2.0 * bend + 6.0 * u * twist) / (t * t)
 
 
 class Segments(NamedTuple):
@@ -239,22 +214,19 @@ class ExactDynamics:
         count = len(position)
         columns, _, places, speeds, _, rates = self._speeds.rows(count)
         # What Pinocchio computes is written in memory that stays. There the frames follow each other, each with the
-        # columns of its rotation and its place.
+        # columns of its rotation and its place, and the linear momentum and the angular one.
         first, second = (data.oMf[k].rotation.T for k in range(2))
         apart = second.ctypes.data - first.ctypes.data
-        read = (
-            data.com[0], data.hg.linear, data.hg.angular, data.J.T,
-            as_strided(first, (len(data.oMf), 4, 3), (apart, 24, 8), writeable=False),
-        )  # fmt: skip
-        com, linear, angular = np.empty((3, count, 3))
-        frames = np.empty((count, *read[-1].shape))
-        found = com, linear, angular, columns, frames
+        place, momentum = data.com[0], as_strided(data.hg.linear, (6,), (8,), writeable=False)
+        jacobian = data.J.T
+        placed = as_strided(first, (len(data.oMf), 4, 3), (apart, 24, 8), writeable=False)
+        com, spatial = np.empty((count, 3)), np.empty((count, 6))
+        frames = np.empty((count, *placed.shape))
         for i, (q, v) in enumerate(zip(position, velocity, strict=True)):
             pin.computeCentroidalMomentum(model, data, q, v)
             pin.computeJointJacobians(model, data)
             pin.updateFramePlacements(model, data)
-            for each, now in zip(found, read, strict=True):
-                each[i] = now
+            com[i], spatial[i], columns[i], frames[i] = place, momentum, jacobian, placed
         contacts, soles = frames[:, self.contact_frames], frames[:, self.sole_frames]
         points, up = contacts[:, :, 3], soles[:, :, 2]
         places[:], speeds[:] = soles[:, :, 3], velocity
@@ -271,7 +243,14 @@ class ExactDynamics:
             turn = rates[:, ball.foot, 3:]
             rates[:, ball.foot, :3] += ball.radius * cross_products(turn, up[:, ball.foot])
         return FeetStates(
-            com, linear / self.mass, angular, points, places, rates[:, :, :3], yaw, pitch
+            com,
+            spatial[:, :3] / self.mass,
+            spatial[:, 3:],
+            points,
+            places,
+            rates[:, :, :3],
+            yaw,
+            pitch,
         )
 
     def _of_speeds(self, count: int) -> tuple[Any, ...]:
@@ -459,30 +438,6 @@ class ExactDynamics:
         change[free] = np.linalg.solve(matrix[np.ix_(free, free)], pushed[free])
         return np.asarray(v + change), np.asarray((matrix @ change - pushed)[6:] * fixed[6:])
 
-    def integrate(
-        self, q: Array, v: Array, joints: JointMotion, force: Array, longest_step: float
-    ) -> list[tuple[float, Array, Array]]:
-        """Return the motion over one interval from the state (q, v) under constant contact forces (n_contacts, 3).
-
-        Returns time since the interval began [s], q and v after every step; ``q`` is followed as
-        position and quaternion, and the joints' part of both is the planned one.
-        """
-        duration = float(joints.duration)
-        count = max(1, int(np.ceil(duration / longest_step - 1e-9)))
-        h = duration / count
-        angles, speeds, _ = joints.at(np.asarray(0.5 * h * np.arange(2 * count + 1)[:, None]))
-        segment = Segments(
-            q[None, :7],
-            v[None, :6],
-            angles,
-            speeds,
-            force[None],
-            np.full(count, h),
-            np.array([count]),
-        )
-        places, rates = self.follow(segment)
-        return [(h * (i + 1), places[i], rates[i]) for i in range(count)]
-
     def follow(self, segments: Segments) -> tuple[Array, Array]:
         """Return the states after every step of all segments in turn: (n_steps, n_positions) and (n_steps,
         n_velocities).
@@ -549,21 +504,33 @@ def rotation_between(first: Array, second: Array) -> Array:
     return np.asarray(4.0 * np.arcsin(np.minimum(1.0, 0.5 * half)))
 
 
-def joint_motion(plan_position: Array, plan_velocity: Array, time: Array, knot: int) -> JointMotion:
-    """Return the joints of a plan between that knot and the next."""
-    every = joint_motions(plan_position, plan_velocity, time, np.array([knot]))
-    start, end, before, after, _ = every
-    duration = float(time[knot + 1] - time[knot])
-    return JointMotion(start[0], end[0], before[0], after[0], duration)
+def states_between(
+    place: Array, rate: Array, time: Array, knots: NDArray[np.int64], passed: Array
+) -> Motion:
+    """Return the places and rates of a motion and the rates' changes, each (n, m), at times ``passed`` since some knots,
+    both (n,): the cubics through the places and rates (n_knots, m) of each of these and the knot behind it.
+
+    Where the rates change evenly over an interval this is exactly the motion. At an impact, whose knots are at one time,
+    only a passed time of zero has a meaning.
+    """
+    call = _cubics(place.shape[1])
+    own_place, own_rate, own_time, own_knots, own_passed, *found = call.rows(len(time), len(knots))
+    own_place[:], own_rate[:], own_time[:] = place, rate, time
+    own_knots[:], own_passed[:] = knots, passed
+    call.run()
+    places, rates, changes = (each.copy() for each in found)
+    return places, rates, changes
 
 
-def joint_motions(
-    position: Array, velocity: Array, time: Array, knots: NDArray[np.int64]
-) -> JointMotion:
-    """Return the same between each of some knots and the one behind it."""
-    return JointMotion(
-        position[knots, 7:], position[knots + 1, 7:], velocity[knots, 6:], velocity[knots + 1, 6:],
-        (time[knots + 1] - time[knots])[:, None],
+@cache
+def _cubics(width: int) -> KernelOnRows:
+    """Return the call of ``cubic_motion`` for so many coordinates."""
+    return KernelOnRows(
+        cubic_motion,
+        lambda knots, n: (
+            np.zeros((knots, width)), np.zeros((knots, width)), np.zeros(knots), np.zeros(n, np.int64), np.zeros(n),
+            np.zeros((n, width)), np.zeros((n, width)), np.zeros((n, width)),
+        ),
     )  # fmt: skip
 
 
@@ -571,11 +538,12 @@ def half_steps(
     position: Array, velocity: Array, time: Array, force: Array, knots: NDArray[np.int64]
 ) -> Segments:
     """Return the intervals of a plan from its states at some knots, each in two steps."""
-    joints = joint_motions(position, velocity, time, knots)
-    quarters = np.arange(5)[:, None, None] * (0.25 * joints.duration)
-    angles, speeds, _ = (each.swapaxes(0, 1) for each in joints.at(np.asarray(quarters)))
+    lengths = time[knots + 1] - time[knots]
+    quarters = (np.arange(5) * (0.25 * lengths)[:, None]).ravel()
+    angles, speeds, _ = states_between(
+        position[:, 7:], velocity[:, 6:], time, np.repeat(knots, 5), quarters
+    )
     return Segments(
-        position[knots, :7], velocity[knots, :6],
-        angles.reshape(-1, angles.shape[2]), speeds.reshape(-1, speeds.shape[2]), force[knots],
-        np.repeat(0.5 * (time[knots + 1] - time[knots]), 2), np.full(len(knots), 2),
+        position[knots, :7], velocity[knots, :6], angles, speeds, force[knots],
+        np.repeat(0.5 * lengths, 2), np.full(len(knots), 2),
     )  # fmt: skip

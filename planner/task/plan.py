@@ -14,6 +14,7 @@ import io
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -100,8 +101,18 @@ class PlannedJump:
                 raise ValueError(
                     f"{name} has {len(getattr(self, name))} rows, but the plan has {knots} knots"
                 )
-        if knots < 2 or np.any(np.diff(self.time) < 0.0):
+        if knots < 2 or np.any(self.steps < 0.0):
             raise ValueError("a plan needs two knots or more, with times that never decrease")
+
+    @cached_property
+    def steps(self) -> Array:
+        """How long the intervals last [s], (N - 1,); those of impacts do not."""
+        return np.asarray(self.time[1:] - self.time[:-1])
+
+    @cached_property
+    def lasting(self) -> NDArray[np.int64]:
+        """The intervals that last."""
+        return np.flatnonzero(self.steps > 0.0)
 
     @property
     def duration(self) -> float:

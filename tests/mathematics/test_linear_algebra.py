@@ -17,6 +17,8 @@ from aloft.mathematics.linear_algebra import (
     pairwise_sum,
     product,
     solve_damped,
+    solve_each_transposed,
+    solve_each_upper,
     solve_positive,
     solve_rows,
     solve_rows_transposed,
@@ -79,6 +81,22 @@ def test_the_factor_and_its_systems():
     solve_rows_transposed(factor, 3, x)
     np.testing.assert_allclose(upper.T @ x[:, :3], rows[:, :3], rtol=1e-11, atol=1e-12)
     assert (x[:, 3] == rows[:, 3]).all()
+
+
+@pytest.mark.parametrize("count", [0, 1, 6])
+def test_systems_with_one_factor_have_the_bits_of_each_alone(count):
+    factor = positive(n=7)
+    assert factorise(factor, 0.0)
+    right = np.random.default_rng(2).standard_normal((count, 7))
+    for together, alone in (
+        (solve_each_transposed, solve_transposed),
+        (solve_each_upper, solve_upper),
+    ):
+        found, expected = right.copy(), right.copy()
+        together(factor, found)
+        for row in expected:
+            alone(factor, row)
+        np.testing.assert_array_equal(found, expected)
 
 
 @pytest.mark.parametrize("spoil", [-1.0, np.nan, np.inf])
