@@ -10,6 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from aloft.mathematics.arrays import Array1D, Array2D
+from aloft.mathematics.kernel import kernel
 from aloft.robots import five_joint_leg
 from aloft.robots.description import find_robot
 from aloft.robots.limb import FootKind, aim, foot_error, read_limb, set_limb_pose, turning
@@ -21,6 +23,7 @@ from aloft.robots.limb_inverse import (
     reach,
 )
 
+from ..compiled import run_compiled
 from .limbed_robots import LIGHT_QUADRUPED, SEVEN_JOINTS, humanoid, quadruped, slider
 
 BRUCE = find_robot("bruce")
@@ -130,6 +133,24 @@ def _rows(limb, angles):
     return np.array(columns).T
 
 
+@kernel
+def reach_it(
+    links: Array2D, tip: Array1D, limits: Array2D, target: Array2D, weights: Array1D,
+    starts: Array2D, tries: int, steps: int, work: Array2D, angles: Array1D, square: Array1D,
+) -> None:  # fmt: skip
+    square[0] = reach(links, tip, limits, target, weights, starts, tries, steps, work, angles)
+
+
+@kernel
+def errors_at(
+    links: Array2D, tip: Array1D, target: Array2D, weights: Array1D, angles: Array2D,
+    anchors: Array2D, pose: Array2D, scratch: Array1D, errors: Array1D,
+) -> None:  # fmt: skip
+    for k in range(errors.shape[0]):
+        set_limb_pose(links, tip, angles[k], anchors, pose)
+        errors[k] = math.sqrt(foot_error(tip, pose, target, weights, scratch))
+
+
 @kinds
 def test_out_of_reach_the_nearest_place_within_the_limits(name):
     """No joint position close to the answer brings the foot nearer."""
@@ -142,12 +163,20 @@ def test_out_of_reach_the_nearest_place_within_the_limits(name):
         target = pose_of(limb, middle)
         target[0] += random.normal(0.0, 1.0, 3)
         target[0] *= 1.5 / np.linalg.norm(target[0])
-        square = reach(limb.links, limb.tip, limb.limits, target, WEIGHTS, starts, 3, 60, work, out)
-        assert square > REACHED
-        assert error(limb, pose_of(limb, out), target) == pytest.approx(math.sqrt(square))
-        for _ in range(60):
-            near = np.clip(out + random.normal(0.0, 0.01, n), limb.limits[:, 0], limb.limits[:, 1])
-            assert error(limb, pose_of(limb, near), target) > math.sqrt(square) - 1e-4
+        square, errors = np.zeros(1), np.zeros(60)
+        run_compiled(
+            reach_it, limb.links, limb.tip, limb.limits, target, WEIGHTS, starts, 3, 60, work, out,
+            square,
+        )  # fmt: skip
+        assert square[0] > REACHED
+        assert error(limb, pose_of(limb, out), target) == pytest.approx(math.sqrt(square[0]))
+        near = out + random.normal(0.0, 0.01, (len(errors), n))
+        run_compiled(
+            errors_at, limb.links, limb.tip, target, WEIGHTS,
+            np.clip(near, limb.limits[:, 0], limb.limits[:, 1]), np.zeros((n, 6)),
+            np.zeros((4, 3)), np.zeros(6), errors,
+        )  # fmt: skip
+        assert errors.min() > math.sqrt(square[0]) - 1e-4
 
 
 @settings(deadline=None, max_examples=60)
