@@ -80,21 +80,33 @@ def test_every_place_that_can_be_reached_is_found(name):
     assert found == count
 
 
+@kernel
+def follow(
+    links: Array2D, tip: Array1D, limits: Array2D, weights: Array1D, path: Array2D,
+    anchors: Array2D, target: Array2D, work: Array2D, angles: Array1D, squares: Array1D,
+    found: Array2D,
+) -> None:  # fmt: skip
+    for k in range(path.shape[0]):
+        set_limb_pose(links, tip, path[k], anchors, target)
+        squares[k] = approach(links, tip, limits, target, weights, 8, work, angles)
+        found[k] = angles
+
+
 @kinds
 def test_a_target_that_moves_is_followed_in_a_few_steps(name):
     robot, foot = LIMBS[name]
     limb = read_limb(robot, foot)
     n = len(limb.joints)
     middle = robot.standing_position[list(limb.joints)]
-    out, work, last = middle.copy(), limb_scratch(n), None
-    for tick in range(300):
-        angles = middle + 0.25 * np.sin(9.0 * 0.002 * tick + np.arange(n))
-        target = pose_of(limb, np.clip(angles, limb.limits[:, 0], limb.limits[:, 1]))
-        square = approach(limb.links, limb.tip, limb.limits, target, WEIGHTS, 8, work, out)
-        assert square <= REACHED
-        if last is not None:
-            assert np.abs(out - last).max() < 0.1
-        last = out.copy()
+    waves = np.sin(9.0 * 0.002 * np.arange(300)[:, None] + np.arange(n))
+    path = np.clip(middle + 0.25 * waves, limb.limits[:, 0], limb.limits[:, 1])
+    squares, found = np.full(300, np.inf), np.zeros((300, n))
+    run_compiled(
+        follow, limb.links, limb.tip, limb.limits, WEIGHTS, path, np.zeros((n, 6)),
+        np.zeros((4, 3)), limb_scratch(n), middle.copy(), squares, found,
+    )  # fmt: skip
+    assert squares.max() <= REACHED
+    assert np.abs(np.diff(found, axis=0)).max() < 0.1
 
 
 @settings(deadline=None)
