@@ -25,7 +25,6 @@ from ..models.exact_dynamics import (
     rotation_between,
     states_between,
 )
-from ..task.phase import Phase
 from ..task.plan import PlannedJump
 
 FLIGHT_STEP = 0.002
@@ -87,7 +86,7 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
     Raises:
         ValueError: it has not one flight for every jump of its task.
     """
-    dynamics, flights, lasting = dynamics_of(robot), flight_knots(plan), plan.lasting
+    dynamics, flights, lasting = dynamics_of(robot), plan.flight_knots, plan.lasting
     flown = [_flight(plan, lift_off, touchdown) for lift_off, touchdown in flights]
     single = half_steps(plan.position, plan.velocity, plan.time, plan.contact_force, lasting)
     places, rates = dynamics.follow(Segments.joined([*(one.segments for one in flown), single]))
@@ -129,27 +128,6 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
         unwrapped(np.arctan2(ahead[:, :, 1], ahead[:, :, 0])),
         flights, impacts,
     )  # fmt: skip
-
-
-def flight_knots(plan: PlannedJump) -> tuple[tuple[int, int], ...]:
-    """Return the knots at lift-off and at touchdown of every flight, the latter before any impact.
-
-    Raises:
-        ValueError: there are more or fewer flights than jumps.
-    """
-    flying = np.flatnonzero((plan.phase[:-1] == Phase.FLIGHT) & (plan.steps > 0.0))
-    found = [
-        (int(run[0]), int(run[-1]) + 1)
-        for run in np.split(flying, np.flatnonzero(np.diff(flying) > 1) + 1)
-        if len(run)
-    ]
-    jumps = len(plan.task.hops())
-    if len(found) != jumps:
-        raise ValueError(
-            f"a plan has a flight, of intervals one after the other, for every jump; found "
-            f"{len(found)} for {jumps}"
-        )
-    return tuple(found)
 
 
 @dataclass(frozen=True)

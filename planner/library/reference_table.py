@@ -22,7 +22,6 @@ from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
-from ..checking.replay import flight_knots
 from ..models.euler_angles import (
     ORDER,
     coordinates_of,
@@ -204,7 +203,7 @@ def _middle_values(
     next, never across lift-off or touchdown.
     """
     lasting = plan.lasting
-    ends = np.array([knot for flight in flight_knots(plan) for knot in flight])
+    ends = np.array([knot for flight in plan.flight_knots for knot in flight])
     middles = 0.5 * (plan.time[lasting] + plan.time[lasting + 1])
     # Each instant lies between two middles of its own group: what is before, between or behind those ends.
     bounds = np.concatenate([[0], np.searchsorted(lasting, ends), [len(lasting)]])
