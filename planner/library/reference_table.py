@@ -22,7 +22,6 @@ from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
-from ..checking.replay import flight_knots
 from ..models.euler_angles import (
     ORDER,
     coordinates_of,
@@ -81,14 +80,16 @@ def reference_table(
             )
     for name in ("com_acceleration", "angular_momentum_rate"):
         columns[name][-1] = 0.0  # the plan has come to rest, and the last row stays
-    standing = {name: values[:1] for name, values in columns.items()}
+    # The table begins at rest in the first state, with two rows.
+    rows = np.concatenate([[0, 0], np.arange(len(instants))])
+    columns = {name: values[rows] for name, values in columns.items()}
     for name in (
         "com_acceleration",
         "angular_acceleration",
         "angular_momentum_rate",
         "joint_acceleration",
     ):
-        standing[name] = np.zeros_like(standing[name])
+        columns[name][:2] = 0.0
     start = {
         phase: stand_time + float(plan.time[plan.phase == phase][0])
         for phase in (Phase.SQUAT, Phase.THRUST, Phase.RECOVER)
@@ -97,7 +98,7 @@ def reference_table(
     end = stand_time + float(plan.time[-1])
     return JumpTable(
         np.concatenate([[0.0, stand_time], stand_time + instants]),
-        {n: np.concatenate([standing[n], standing[n], c]) for n, c in columns.items()},
+        columns,
         stand_time,
         start.get(Phase.THRUST, start.get(Phase.SQUAT, stand_time)),
         stand_time + plan.lift_off_time,
@@ -202,7 +203,7 @@ def _middle_values(
     next, never across lift-off or touchdown.
     """
     lasting = plan.lasting
-    ends = np.array([knot for flight in flight_knots(plan) for knot in flight])
+    ends = np.array([knot for flight in plan.flight_knots for knot in flight])
     middles = 0.5 * (plan.time[lasting] + plan.time[lasting + 1])
     # Each instant lies between two middles of its own group: what is before, between or behind those ends.
     bounds = np.concatenate([[0], np.searchsorted(lasting, ends), [len(lasting)]])
@@ -228,15 +229,15 @@ def _rows(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str
         "com_velocity": feet.com_velocity,
         "com_acceleration": force.sum(axis=1) / dynamics.mass + np.array([0.0, 0.0, -GRAVITY]),
         "orientation": q[:, 3:7].copy(),
-        "angular_velocity": v[:, 3:6].copy(),
+        "angular_velocity": v[:, 3:6],
         "angular_momentum": feet.momentum,
         "angular_momentum_rate": moments.sum(axis=1),
         "foot_position": feet.soles,
         "foot_velocity": feet.sole_velocity,
         "foot_yaw": feet.yaw,
         "foot_pitch": feet.pitch,
-        "joint_position": q[:, 7:].copy(),
-        "joint_velocity": v[:, 6:].copy(),
+        "joint_position": q[:, 7:],
+        "joint_velocity": v[:, 6:],
     }
 
 

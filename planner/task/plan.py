@@ -25,6 +25,7 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...runtime.language.errors import AloftError
 from .files import write_whole
+from .phase import Phase
 from .task import JumpTask, JumpTaskError, make_task
 
 FILE_FORMAT = "aloft jump plan 1"
@@ -113,6 +114,27 @@ class PlannedJump:
     def lasting(self) -> NDArray[np.int64]:
         """The intervals that last."""
         return np.flatnonzero(self.steps > 0.0)
+
+    @cached_property
+    def flight_knots(self) -> tuple[tuple[int, int], ...]:
+        """The knots at lift-off and at touchdown of every flight, the latter before any impact.
+
+        Raises:
+            ValueError: there are more or fewer flights than jumps.
+        """
+        flying = np.flatnonzero((self.phase[:-1] == Phase.FLIGHT) & (self.steps > 0.0))
+        found = [
+            (int(run[0]), int(run[-1]) + 1)
+            for run in np.split(flying, np.flatnonzero(np.diff(flying) > 1) + 1)
+            if len(run)
+        ]
+        jumps = len(self.task.hops())
+        if len(found) != jumps:
+            raise ValueError(
+                f"a plan has a flight, of intervals one after the other, for every jump; found "
+                f"{len(found)} for {jumps}"
+            )
+        return tuple(found)
 
     @property
     def duration(self) -> float:
