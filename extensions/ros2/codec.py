@@ -451,10 +451,10 @@ class Codec:
         value = getattr(owner, name)
         if leaf.parts:
             value = [getattr(value, part) for part in leaf.parts]
-        value = np.asarray(value, leaf.dtype)
-        if leaf.base in _OCTETS:
-            value &= 0xFF
-        return unit_quaternions(value, ".".join(leaf.path)) if leaf.parts == "xyzw" else value
+        if leaf.parts == "xyzw":
+            return unit_quaternions(np.asarray(value, leaf.dtype), ".".join(leaf.path))
+        numbers: NDArray[Any] = np.asarray(value, leaf.dtype)
+        return numbers & 0xFF if leaf.base in _OCTETS else numbers
 
     def _rank(self, message: Any) -> NDArray[np.int64] | None:
         """Return the places in the message's lists of the names in ``order``."""
