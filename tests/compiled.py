@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from aloft.mathematics.arrays import Array, Array1D, Array2D
@@ -11,6 +14,13 @@ from aloft.mathematics.ground_surface import Surface, height_of_ground
 from aloft.mathematics.kernel import kernel
 from aloft.robots.contact_kinematics import ContactKinematics, contact_motion
 from aloft.robots.terrain import Terrain
+
+
+def run_compiled(kernel: Callable[..., None], *arguments: Any) -> None:
+    """Call a kernel as machine code, whose results have the bits of plain Python."""
+    call = KernelCall(kernel, *arguments)
+    compile_calls([call])
+    call.run()
 
 
 class Sight:
@@ -41,7 +51,5 @@ def look_at_ground(surface: Surface, places: Array2D, heights: Array1D, normals:
 def heights_and_normals(ground: Terrain, places: Array) -> tuple[Array, Array]:
     """The height (n,) [m] and the normal (n, 3) of the ground at places (n, 2) [m]."""
     heights, normals = np.zeros(len(places)), np.zeros((len(places), 3))
-    call = KernelCall(look_at_ground, ground.surface, np.array(places), heights, normals)
-    compile_calls([call])
-    call.run()
+    run_compiled(look_at_ground, ground.surface, np.array(places), heights, normals)
     return heights, normals

@@ -27,7 +27,6 @@ from .output import (
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
-    from rich.table import Table
 
     from ...logs.recording.recorder import Recorder
     from ...logs.recording.recorder_link import RecorderLink
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from ...runtime.language.stages import CheckedGraph
     from ...runtime.running.real_time import RealTimeOptions
     from ...studies.batch.seeds import SeedRow
+    from .plain_console import Table
 
 
 class RunnableGraph(Protocol):

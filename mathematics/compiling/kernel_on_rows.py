@@ -17,6 +17,8 @@ from .kernel_call import KernelCall
 
 LEAST = 64
 """The number of rows for which there is memory at first."""
+KEPT = 32
+"""The lengths whose arrays are kept: to cut them takes longer than many calls."""
 
 
 class KernelOnRows(threading.local):
@@ -38,7 +40,7 @@ class KernelOnRows(threading.local):
 
     def __init__(self, kernel: Callable[..., None], make: Callable[..., tuple[Any, ...]]) -> None:
         self._kernel, self._make = kernel, make
-        self._most: tuple[int, ...] = ()
+        self._most: tuple[int, ...] = ()  # none yet
         self._counts: tuple[int, ...] = ()
         self.run: Callable[[], Any] = self._not_yet
 
@@ -46,21 +48,32 @@ class KernelOnRows(threading.local):
         """Return the arguments, with arrays of so many rows, for the next ``run``; they hold what earlier calls left
         there, and later ones overwrite it.
         """
-        if len(self._most) != len(counts) or any(map(gt, counts, self._most)):
+        if not self._most or any(map(gt, counts, self._most)):
             self._make_room(counts)
+        if counts not in self._known:
+            if len(self._known) >= KEPT:
+                self._known.clear()
+            lengths = [None if j is None else counts[j] + more for j, more in self._lengths]
+            given = _cut(self._arguments, iter(lengths))
+            self._known[counts] = given, [length for length in lengths if length is not None]
+        given, own = self._known[counts]
         if counts != self._counts:
             self._counts = counts
-            lengths = [None if j is None else counts[j] + more for j, more in self._lengths]
-            self._given = _cut(self._arguments, iter(lengths))
             if self._words is None:
-                self.run = partial(self._kernel, *self._given)
+                self.run = partial(self._kernel, *given)
             else:
-                self._words[self._places] = [length for length in lengths if length is not None]
-        return self._given
+                self._words[self._places] = own
+        return given
 
     def _make_room(self, counts: tuple[int, ...]) -> None:
         """Make memory for at least so many rows, and the call."""
-        self._most, self._counts = tuple(max(2 * count, LEAST) for count in counts), ()
+        most = self._most or (0,) * len(counts)
+        self._most = tuple(
+            now if count <= now else max(2 * count, LEAST)
+            for count, now in zip(counts, most, strict=True)
+        )
+        self._counts = ()
+        self._known: dict[tuple[int, ...], tuple[tuple[Any, ...], list[int]]] = {}
         self._arguments = self._make(*self._most)
         leaves = list(_leaves(self._arguments))
         self._lengths: list[tuple[int | None, int]] = [(None, 0)] * len(leaves)

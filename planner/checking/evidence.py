@@ -51,16 +51,21 @@ def ground_height(
 ) -> Array:
     """Return the ground's height [m] at ``x``, ``y`` [m].
 
-    ``progress``, of the same shape, is how many flights are over, with the share of the present
+    ``progress``, of the same shape or the last axes of it, is how many flights are over, with the share of the present
     one's time: 1.5 in the middle of the second flight. Below 0 counts as 0, above all as all.
     """
     hops, places = task.hops(), task.places()
     if all(place.z == 0.0 and place.slope == LEVEL for place in places):
         return np.zeros(x.shape)
-    done = np.clip(np.broadcast_to(progress, x.shape), 0.0, len(hops))
-    levels = np.array([np.broadcast_to(place.height(x, y), x.shape) for place in places])
+    # What follows from the progress alone is worked out in its own shape, which is smaller than that of ``x``.
+    done = np.clip(progress, 0.0, len(hops))
     nearest = np.floor(done + 0.5).astype(np.int64)
-    found = np.take_along_axis(levels, nearest[np.newaxis], axis=0)[0]
+    if task.leans:
+        levels = np.array([np.broadcast_to(place.height(x, y), x.shape) for place in places])
+        found = np.take_along_axis(levels, np.broadcast_to(nearest, x.shape)[np.newaxis], axis=0)[0]
+    else:
+        levels = np.array([place.z for place in places])
+        found = levels[nearest]
     for number, hop in enumerate(hops):
         edge = edge_of(hop, places[number])
         if edge is None:
@@ -69,7 +74,7 @@ def ground_height(
         flying = (done > number) & (done < number + 1)
         found = np.where(beyond & (flying | (done == number)), levels[number + 1], found)
         found = np.where(~beyond & (flying | (done == number + 1)), levels[number], found)
-    return np.asarray(found)
+    return np.broadcast_to(found, x.shape)
 
 
 Shapes = Mapping[str, Sequence[MovingShape]]
@@ -241,17 +246,11 @@ class Evidence:
     def middles(self) -> NDArray[np.int64]:
         """The sample nearest to the middle of every interval that lasts."""
         time, samples = self.plan.time, self.replay.samples
-        lasting = np.flatnonzero(np.diff(time) > 0.0)
-        first = np.searchsorted(samples.knot, lasting)
-        behind = np.searchsorted(samples.knot, lasting, side="right")
-        middle = 0.5 * (time[lasting] + time[lasting + 1])
-        return np.array(
-            [
-                i + int(np.abs(samples.time[i:j] - m).argmin())
-                for i, j, m in zip(first.tolist(), behind.tolist(), middle.tolist(), strict=True)
-            ],
-            np.int64,
-        )
+        apart = np.abs(samples.time - (0.5 * (time[:-1] + time[1:]))[samples.knot])
+        first = np.searchsorted(samples.knot, np.arange(len(time) - 1))
+        nearest = np.flatnonzero(apart == np.minimum.reduceat(apart, first)[samples.knot])
+        found = nearest[np.searchsorted(nearest, first)]
+        return np.asarray(found[self.plan.lasting], np.int64)
 
     @cached_property
     def shapes(self) -> Shapes:
@@ -354,7 +353,7 @@ class Evidence:
 
     def figures(self) -> dict[str, float]:
         """Return the plan's performance and loads, by name with unit."""
-        r, lasting = self.replay, np.diff(self.plan.time) > 0.0
+        r, lasting = self.replay, self.plan.lasting
         force = self.plan.contact_force[:-1][lasting].sum(axis=1)[:, 2]
         k = r.flights[0][0]
         return {

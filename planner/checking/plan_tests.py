@@ -204,11 +204,10 @@ def contacts(e: Evidence) -> Iterator[PlanTestResult]:
     loaded = plan.contact[s.knot]
     flying = plan.phase[s.knot] == Phase.FLIGHT
     standing = loaded & ~flying[:, None]
-    slip = np.zeros(len(names))
-    for place in range(len(plan.flights) + 1):
-        there = (standing & (e.place == place)[:, None])[:, :, None]
-        most, least = (np.where(there, e.resting, sign * np.inf) for sign in (-1.0, 1.0))
-        slip = np.maximum(slip, (most.max(axis=0) - least.min(axis=0)).max(axis=1))
+    begins, there = np.flatnonzero(np.diff(e.place, prepend=-1)), standing[:, :, None]
+    most = np.maximum.reduceat(np.where(there, e.resting, -np.inf), begins)
+    least = np.minimum.reduceat(np.where(there, e.resting, np.inf), begins)
+    slip = np.maximum((most - least).max(axis=(0, 2)), 0.0)
     yield PlanTestResult("foot_slip", slip.max(), 3 * MILLIMETRE, "m", "how far a loaded point moves",
                 names[int(slip.argmax())])  # fmt: skip
     height = np.where(standing, np.abs(e.point_height), 0.0)

@@ -22,7 +22,6 @@ from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
-from ..checking.replay import flight_knots
 from ..models.euler_angles import (
     ORDER,
     coordinates_of,
@@ -81,14 +80,16 @@ def reference_table(
             )
     for name in ("com_acceleration", "angular_momentum_rate"):
         columns[name][-1] = 0.0  # the plan has come to rest, and the last row stays
-    standing = {name: values[:1] for name, values in columns.items()}
+    # The table begins at rest in the first state, with two rows.
+    rows = np.concatenate([[0, 0], np.arange(len(instants))])
+    columns = {name: values[rows] for name, values in columns.items()}
     for name in (
         "com_acceleration",
         "angular_acceleration",
         "angular_momentum_rate",
         "joint_acceleration",
     ):
-        standing[name] = np.zeros_like(standing[name])
+        columns[name][:2] = 0.0
     start = {
         phase: stand_time + float(plan.time[plan.phase == phase][0])
         for phase in (Phase.SQUAT, Phase.THRUST, Phase.RECOVER)
@@ -97,7 +98,7 @@ def reference_table(
     end = stand_time + float(plan.time[-1])
     return JumpTable(
         np.concatenate([[0.0, stand_time], stand_time + instants]),
-        {n: np.concatenate([standing[n], standing[n], c]) for n, c in columns.items()},
+        columns,
         stand_time,
         start.get(Phase.THRUST, start.get(Phase.SQUAT, stand_time)),
         stand_time + plan.lift_off_time,
@@ -140,7 +141,7 @@ class _States(NamedTuple):
 def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, float]) -> _States:
     """Return the motion, knots and what lies between them; two rows at an impact."""
     last = len(plan.time) - 1
-    lengths = np.diff(plan.time)
+    lengths = plan.steps
     longest = [steps.get(Phase(phase), STEP) for phase in plan.phase[:-1].tolist()]
     counts = np.maximum(np.ceil(lengths / longest - 1e-9), 1.0).astype(np.int64)
     knot = np.repeat(np.arange(last), counts)
@@ -201,21 +202,21 @@ def _middle_values(
     """Return what the intervals' values (n_knots, m) are at instants in those intervals: linear from one middle to the
     next, never across lift-off or touchdown.
     """
-    lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
-    ends = np.array([knot for flight in flight_knots(plan) for knot in flight])
-    found = np.empty((len(instants), values.shape[1]))
+    lasting = plan.lasting
+    ends = np.array([knot for flight in plan.flight_knots for knot in flight])
+    middles = 0.5 * (plan.time[lasting] + plan.time[lasting + 1])
+    # Each instant lies between two middles of its own group: what is before, between or behind those ends.
+    bounds = np.concatenate([[0], np.searchsorted(lasting, ends), [len(lasting)]])
     number = np.searchsorted(ends, intervals, side="right")
-    for k, group in enumerate(np.split(lasting, np.searchsorted(lasting, ends))):
-        here = np.flatnonzero(number == k)
-        middles = 0.5 * (plan.time[group] + plan.time[group + 1])
-        after = np.searchsorted(middles, instants[here])
-        outside = (after == 0) | (after == len(middles))
-        found[here] = values[group[np.minimum(after, len(middles) - 1)]]
-        here, after = here[~outside], after[~outside]
-        share = (instants[here] - middles[after - 1]) / (middles[after] - middles[after - 1])
-        first, second = values[group[after - 1]], values[group[after]]
-        found[here] = first + share[:, None] * (second - first)
-    return found
+    first, stop = bounds[number], bounds[number + 1]
+    after = np.clip(np.searchsorted(middles, instants), first, stop)
+    found = values[lasting[np.minimum(after, stop - 1)]]
+    inside = np.flatnonzero((after > first) & (after < stop))
+    after = after[inside]
+    share = (instants[inside] - middles[after - 1]) / (middles[after] - middles[after - 1])
+    before = values[lasting[after - 1]]
+    found[inside] = before + share[:, None] * (values[lasting[after]] - before)
+    return np.asarray(found)
 
 
 def _rows(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str, Array]:
@@ -228,15 +229,15 @@ def _rows(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str
         "com_velocity": feet.com_velocity,
         "com_acceleration": force.sum(axis=1) / dynamics.mass + np.array([0.0, 0.0, -GRAVITY]),
         "orientation": q[:, 3:7].copy(),
-        "angular_velocity": v[:, 3:6].copy(),
+        "angular_velocity": v[:, 3:6],
         "angular_momentum": feet.momentum,
         "angular_momentum_rate": moments.sum(axis=1),
         "foot_position": feet.soles,
         "foot_velocity": feet.sole_velocity,
         "foot_yaw": feet.yaw,
         "foot_pitch": feet.pitch,
-        "joint_position": q[:, 7:].copy(),
-        "joint_velocity": v[:, 6:].copy(),
+        "joint_position": q[:, 7:],
+        "joint_velocity": v[:, 6:],
     }
 
 

@@ -178,9 +178,7 @@ def can_start(problem: FullProblem, plan: PlannedJump) -> bool:
     """Check whether a plan goes through the same phases, so that ``pack`` can make variables of it."""
     if _same_grid(problem, plan):
         return True
-    impacts = bool(np.any(np.diff(plan.time) <= 0.0)) or any(
-        s.impact for s in problem.problem_phases
-    )
+    impacts = bool(np.any(plan.steps <= 0.0)) or any(s.impact for s in problem.problem_phases)
     return not impacts and same_phases(
         plan.phase[:-1].tolist(), [int(phase) for phase in problem.phases]
     )
@@ -193,7 +191,7 @@ def _same_grid(problem: FullProblem, plan: PlannedJump) -> bool:
     return (
         intervals
         and plan.phase[:-1].tolist() == [int(phase) for phase in problem.phases]
-        and set(np.flatnonzero(np.diff(plan.time) <= 0.0).tolist()) == impacts
+        and set(np.flatnonzero(plan.steps <= 0.0).tolist()) == impacts
     )
 
 
@@ -206,7 +204,7 @@ def pack(problem: FullProblem, plan: PlannedJump, guess: Array | None = None) ->
     assembly, coordinates = problem.assembly, problem.coordinates
     n = coordinates.size
     q, v = coordinates_of(plan.position, plan.velocity)
-    steps, force = np.diff(plan.time), plan.contact_force.reshape(len(plan.time), -1)
+    steps, force = plan.steps, plan.contact_force.reshape(len(plan.time), -1)
     instants = plan.time
     if not _same_grid(problem, plan):
         phases = [int(phase) for phase in problem.phases]

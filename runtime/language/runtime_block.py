@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -69,6 +70,7 @@ class RuntimeBlock(PortOwner):
         """The parameters that kernels read, in the arrays in which they read them."""
 
     @classmethod
+    @cache
     def is_moore(cls) -> bool:
         """Return whether outputs follow from state alone (``emit`` and ``update``).
 
