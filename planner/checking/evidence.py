@@ -51,16 +51,21 @@ def ground_height(
 ) -> Array:
     """Return the ground's height [m] at ``x``, ``y`` [m].
 
-    ``progress``, of the same shape, is how many flights are over, with the share of the present
+    ``progress``, of the same shape or the last axes of it, is how many flights are over, with the share of the present
     one's time: 1.5 in the middle of the second flight. Below 0 counts as 0, above all as all.
     """
     hops, places = task.hops(), task.places()
     if all(place.z == 0.0 and place.slope == LEVEL for place in places):
         return np.zeros(x.shape)
-    done = np.clip(np.broadcast_to(progress, x.shape), 0.0, len(hops))
-    levels = np.array([np.broadcast_to(place.height(x, y), x.shape) for place in places])
+    # What follows from the progress alone is worked out in its own shape, which is smaller than that of ``x``.
+    done = np.clip(progress, 0.0, len(hops))
     nearest = np.floor(done + 0.5).astype(np.int64)
-    found = np.take_along_axis(levels, nearest[np.newaxis], axis=0)[0]
+    if task.leans:
+        levels = np.array([np.broadcast_to(place.height(x, y), x.shape) for place in places])
+        found = np.take_along_axis(levels, np.broadcast_to(nearest, x.shape)[np.newaxis], axis=0)[0]
+    else:
+        levels = np.array([place.z for place in places])
+        found = levels[nearest]
     for number, hop in enumerate(hops):
         edge = edge_of(hop, places[number])
         if edge is None:
@@ -69,7 +74,7 @@ def ground_height(
         flying = (done > number) & (done < number + 1)
         found = np.where(beyond & (flying | (done == number)), levels[number + 1], found)
         found = np.where(~beyond & (flying | (done == number + 1)), levels[number], found)
-    return np.asarray(found)
+    return np.broadcast_to(found, x.shape)
 
 
 Shapes = Mapping[str, Sequence[MovingShape]]
