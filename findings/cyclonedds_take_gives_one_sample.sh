@@ -1,5 +1,5 @@
 #!/bin/sh
-# cyclonedds 11.0.1 (Python): `reader.take()` and `reader.read()` give one sample, the oldest that is there: their argument N is 1 unless it is given. In C++ and C# of DDS, and in the words of its standard, take without a limit
+# cyclonedds 11.0.1 (Python): `reader.take()` and `reader.read()` give one sample, the oldest that is there: their argument N is 1 unless it is given. In C++, and in the words of the standard, take without a limit
 # gives all. The loop that is usual there, `for sample in reader.take(): newest = sample` once a tick, so falls behind a faster publisher for ever, without a loss that anybody counts.
 # Expected: after a tick the newest sample. Seen: five samples of 2 ms each tick of 10 ms, 100 ticks: the newest that the loop has is number 99 of 499, 800 ms old; with N=1000 it is 499. With the reader's default
 # history (keep the last one) the other way round: of each five four are dropped, so a log of all samples has a fifth of them. Exits with 0 while this is so, else with 1.
