@@ -224,7 +224,8 @@ class Drawing:
                 at = times.get(f"{group}.{part}", times[group])
                 own[f"{group}.{part}"] = self._quantity(drawn, part, at, unit, width)
         for foot in [each.name for each in self.robot.feet][: self.one_of(0, 1, 2)]:
-            at = times.get(f"contacts.{foot}", times["contacts"])
+            own_topic = f"contacts.{foot}"
+            at = times[own_topic if own_topic in times else "contacts"]
             if self.happens(0.7):
                 own[f"contacts.{foot}.force"] = self._quantity(drawn, "force", at, "N", 1)
             else:
