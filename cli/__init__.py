@@ -10,7 +10,6 @@ import os
 import sys
 import threading
 from collections.abc import Iterable
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -64,23 +63,13 @@ def run_arguments() -> None:
         _print_page()
         sys.exit(0)
     gc.set_threshold(*COLLECTED_AFTER)
-    _without_plugins()
-    from .shared.dataclass_methods import make_when_called
+    from ..processes.quick_imports import make_when_called, without_plugins
 
+    without_plugins()
     make_when_called()
     from .app import main as run_command_line
 
     run_command_line()
-
-
-def _without_plugins() -> None:
-    """Let Pydantic neither look through all installed packages for plugins, a tenth of a start, nor import what would,
-    a twentieth; unless the variable of the environment says which plugins it shall have.
-    """
-    if os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__") == "__all__":
-        none = ModuleType("pydantic.plugin._loader")
-        vars(none)["get_plugins"] = tuple
-        sys.modules.setdefault(none.__name__, none)
 
 
 def _print_page() -> None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 import yaml
 
@@ -18,6 +19,7 @@ from .logged_joints import (
     LoggedJoints,
     columns_of_joints,
     commented,
+    doubt_of,
     lists_of_joints,
     name_joints,
 )
@@ -29,9 +31,9 @@ if TYPE_CHECKING:
     from ..robots.robot_description import RobotDescription
 
 _WORDS: Mapping[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
-    "time": (("stamp", "time"), (1,)),
-    "angular_velocity": (("angular_velocity", "gyro", "omega"), (3,)),
-    "specific_force": (("specific_force", "linear_acceleration", "accel", "imuacc", "acc"), (3,)),
+    "time": (("stamp", "time", "t"), (1,)),
+    "specific_force": (("specific_force", "linear_acceleration", "acc", "a"), (3,)),
+    "angular_velocity": (("angular_velocity", "gyr", "omega", "w"), (3,)),
     "joint_position": (
         ("joint_position", "jointspos", "joint_states.position", "position", "pos", "q"),
         (),
@@ -41,14 +43,14 @@ _WORDS: Mapping[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
         (),
     ),
     "joint_torque": (("joint_torque", "effort", "torque", "tau"), ()),
-    "truth_position": (("basepos", "base_position", "mocap", "pose.position"), (3,)),
+    "truth_position": (
+        ("basepos", "truth.base_position", "base_position", "mocap", "pose.position"),
+        (3,),
+    ),
     "truth_rpy": (("baserot", "base_rpy", "rpy"), (3,)),
-    "truth_quaternion": (("quaternion", "pose.orientation"), (4,)),
+    "truth_quaternion": (("quaternion", "pose.orientation", "base_orientation"), (4,)),
 }
 """Words in the names of columns, the likeliest first, and their widths; none: as many as there are joints."""
-_LIKELY = ("meas", "actual", "fbk", "feedback")
-_UNLIKELY = ("des", "ref", "cmd", "command", "target", "setpoint", "filt", "fric", "err", "con")
-"""Words of what was measured, and of what was wanted or computed: no sensor."""
 _FORCE = re.compile(r"(force|grf)_?z?$|fz$", re.IGNORECASE)
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+")
 _SIDES = {"l": "left", "lf": "left", "left": "left", "r": "right", "rf": "right", "right": "right"}
@@ -56,6 +58,14 @@ _SIDES = {"l": "left", "lf": "left", "left": "left", "r": "right", "rf": "right"
 _CLOSES, _OPENS = 0.25, 0.2
 """Shares of the weight above which a foot's contact is closed, and below which it is opened."""
 _NUMBERED = re.compile(r"(?P<stem>.*?)[_\[]?(?P<number>\d+)\]?(?P<rest>\D*)")
+_AXES = (
+    re.compile(r"(.+?)([xyzw])(\)?)", re.IGNORECASE),
+    re.compile(r"((?:.*[^a-z])?)([xyzw])([^a-z].*)", re.IGNORECASE),
+)
+"""Names with an axis at their end, and with one that stands alone: `GyrX`, `acc_x_raw`."""
+_STAMP_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_STEPS = (1e-4, 0.1)
+"""Units of stamps [s]; between these are the steps of a log whose stamps' unit is guessed [s]."""
 
 Guess = str | list[str]
 """A column, or the columns of one number each, in order."""
@@ -92,17 +102,25 @@ def import_log(
         guessed = guess(widths, _numbers_of_joints(found, described, given))
         if described is not None and "joint_position" not in guessed:
             guessed = guess(widths)
-        own = {} if described is None else columns_of_joints(widths, described)
+        own = (
+            {}
+            if described is None
+            else columns_of_joints(widths, described, _one(guessed.get("specific_force", "")))
+        )
         forces = {} if described is None else forces_of_feet(widths, described)
         target = out or file.with_suffix(".yaml")
         if target.exists() and not force:
             raise AloftError(f"{target} exists; --force overwrites it, --out names another")
         own_stamps = any(each.stamps is not None for each in found.arrays.values())
+        dates = [name for name, each in found.arrays.items() if each.unit in _STAMP_UNITS and widths[name] == 1]  # fmt: skip
+        if "time" not in guessed and dates:
+            guessed["time"] = dates[0]
         graph = graph_of(_beside(target, file), robot, guessed, own_stamps)
         played = graph["blocks"]["robot"]["with"]
         if own:
             played["joints"] = own
             guessed = {k: v for k, v in guessed.items() if not k.startswith("joint_")}
+            guessed |= {f"joint_{part}": own[part] for part in own if part != "names"}
         if described is not None and forces:
             weight = GRAVITY * described.total_mass
             played["contacts"] = {
@@ -114,7 +132,11 @@ def import_log(
                 for foot, column in forces.items()
             }
         guessed |= {f"force of {foot}": column for foot, column in forces.items()}
-        notes = _arrivals(found, played)
+        switches = {} if described is None or forces else switches_of_feet(widths, described)
+        if switches:
+            played["contacts"] = {foot: {"closed": each} for foot, each in switches.items()}
+            guessed |= {f"contact of {foot}": each for foot, each in switches.items()}
+        notes = _clock(found, played, guessed)
         named = LoggedJoints()
         if "joints" in played:
             try:
@@ -173,28 +195,56 @@ def _numbers_of_joints(
     return tuple(listed) or (() if robot is None else (len(robot.joints),))
 
 
+def _one(guess: Guess) -> str:
+    return guess if isinstance(guess, str) else guess[0]
+
+
 def _beside(graph: Path, file: Path) -> Path:
     """Return a log's path from the folder of a graph."""
     return Path(os.path.relpath(file.resolve(), graph.parent.resolve()))
 
 
-def _arrivals(log: LogFile, played: dict[str, Any]) -> list[str]:
-    """Take stamps whose steps vary much for arrival times, and say so."""
-    from ..hal.log.columns import MOST_JITTER, LogClock, moments_of
+def _clock(log: LogFile, played: dict[str, Any], guessed: Mapping[str, Guess]) -> list[str]:
+    """Guess the unit of stamps that have none, and take those whose steps vary much for arrival times; say so."""
+    from ..hal.log.columns import MOST_APART, MOST_JITTER, LogClock, moments_of, usual_step
     from ..hal.log.log_file import LogError
+    from ..hal.log.series import GAP, Series
 
     if "clock" not in played:
         return []
-    rows = len(log.array(played["clock"]["stamps"]).values)
+    clock, notes = played["clock"], []
+    stamps = log.array(clock["stamps"])
+    step = usual_step(stamps.values[:, 0])
+    if stamps.unit is None and step > MOST_APART:
+        fits = [unit for unit, per in _STAMP_UNITS.items() if _STEPS[0] <= step * per < _STEPS[1]]
+        if fits:
+            clock["unit"] = fits[0]
+            rate = 1.0 / (step * _STAMP_UNITS[fits[0]])
+            notes.append(
+                f"the stamps are taken for {fits[0]}, {rate:.4g} rows a second (clock.unit)"
+            )
+    given = LogClock.model_validate(clock)
     try:
-        jitter = moments_of(log, LogClock.model_validate(played["clock"]), rows, None).jitter
+        times = moments_of(log, given, len(stamps.values), None).times
     except LogError as error:
-        return [str(error)]
-    if jitter <= MOST_JITTER:
-        return []
-    played["clock"]["even"] = True
+        return [*notes, str(error)]
+    # a table of several topics has numbers of each in some of its rows only, whose steps count
+    spreads = [Series(times, stamps.values).spread()]
+    for columns in guessed.values():
+        names = columns if isinstance(columns, list) else [columns]
+        arrays = [log.array(name).values for name in names]
+        if {len(each) for each in arrays} == {len(times)}:
+            rows = np.isfinite(np.hstack(arrays)).all(axis=1)
+            if rows.any():
+                spreads.append(Series(times[rows], stamps.values[rows]).spread())
+    even = given.model_copy(update={"even": True})
+    shift = moments_of(log, even, len(times), None).shift
+    if min(spreads) <= MOST_JITTER or shift > GAP * usual_step(times):  # rows are missing
+        return notes
+    clock["even"] = True
     return [
-        f"the steps between stamps vary by {100.0 * jitter:.0f} %: they are taken for arrival times, rows evenly apart (clock.even)"
+        *notes,
+        f"the steps between stamps vary by {100.0 * min(spreads):.0f} %: they are taken for arrival times, rows evenly apart (clock.even)",
     ]
 
 
@@ -202,9 +252,12 @@ def described_robot(robot: Path | None) -> RobotDescription | None:
     """Return a robot's description; ``None`` without one. Raises ``AloftError``."""
     if robot is None:
         return None
-    from ..robots.description import find_robot
+    from ..robots.description import RobotError, find_robot
 
-    return find_robot(str(robot))
+    try:
+        return find_robot(str(robot))
+    except (LookupError, RobotError) as error:
+        raise AloftError(f"--robot {robot}: {error.args[0]}") from error
 
 
 def forces_of_feet(widths: Mapping[str, int], robot: RobotDescription) -> dict[str, str]:
@@ -219,6 +272,22 @@ def forces_of_feet(widths: Mapping[str, int], robot: RobotDescription) -> dict[s
         if len(feet) == len(columns) == 1:
             found[feet[0]] = columns[0]
     return found
+
+
+def switches_of_feet(widths: Mapping[str, int], robot: RobotDescription) -> dict[str, list[str]]:
+    """Return the columns of the switches in each foot's points, where a log of aloft has one for every point."""
+    whole = [name for name, width in widths.items() if width == len(robot.contacts) > 0]
+    columns = {name: [f"{name}[{k}]" for k in range(widths[name])] for name in whole} | {
+        stem: each for stem, each in numbered(widths).items() if len(each) == len(robot.contacts)
+    }
+    found = [each for name, each in columns.items() if name.endswith(".contacts.closed")]
+    if len(found) != 1:
+        return {}
+    owners = robot.foot_of_contact()
+    return {
+        foot.name: [column for column, owner in zip(found[0], owners, strict=True) if owner == k]
+        for k, foot in enumerate(robot.feet)
+    }
 
 
 def _side(name: str) -> str | None:
@@ -239,17 +308,20 @@ def guess(widths: Mapping[str, int], joints: Collection[int] = ()) -> dict[str, 
     Returns:
         The column, or the columns in order, by quantity.
     """
-    series = numbered(widths)
+    counted = numbered(widths)
+    series = {**of_axes(widths), **counted}
     known = {**widths, **{stem: len(columns) for stem, columns in series.items()}}
     guessed: dict[str, Guess] = {}
     for what, (words, allowed) in _WORDS.items():
         free = [name for name in known if name not in guessed.values()]
         fitting = [
             name
-            for name in sorted(free, key=_doubt)
-            if (known[name] in allowed if allowed else _of_joints(name, known, series, joints))
+            for name in free
+            if (known[name] in allowed if allowed else _of_joints(name, known, counted, joints))
         ]
-        column = _first(words, fitting)
+        measured = not what.startswith("truth")
+        beside = guessed.get("specific_force" if measured else "truth_position", "")
+        column = _best(words, fitting, _one(beside), measured)
         if column is not None:
             guessed[what] = column
     return {what: series.get(str(column), column) for what, column in guessed.items()}
@@ -270,6 +342,20 @@ def numbered(widths: Mapping[str, int]) -> dict[str, list[str]]:
     }  # fmt: skip
 
 
+def of_axes(widths: Mapping[str, int]) -> dict[str, list[str]]:
+    """Return the columns of one number for x, y, z, and w where there is one, by what their names share."""
+    found: dict[str, dict[str, str]] = {}
+    for name, width in widths.items():
+        for match in [match for form in _AXES if width == 1 and (match := form.fullmatch(name))]:
+            stem = match[1].rstrip("_/.( ") + match[3]
+            found.setdefault(stem, {})[match[2].lower()] = name
+    return {
+        stem: [columns[axis] for axis in "xyzw" if axis in columns]
+        for stem, columns in found.items()
+        if set("xyz") <= set(columns) and stem not in widths
+    }
+
+
 def _of_joints(
     name: str, widths: Mapping[str, int], series: Mapping[str, list[str]], joints: Collection[int]
 ) -> bool:
@@ -279,20 +365,20 @@ def _of_joints(
     return widths[name] > 4 or name in series
 
 
-def _doubt(name: str) -> int:
-    """Return 0 for a column that says that it was measured, 2 for one that was wanted or computed, else 1."""
-    parts = re.split(r"[^a-z]+", name.lower())
-    if any(word in name.lower() for word in _LIKELY):
-        return 0
-    return 2 if any(word in parts for word in _UNLIKELY) else 1
-
-
-def _first(words: Iterable[str], names: list[str]) -> str | None:
-    for word in words:
-        for name in names:
-            if word in name.lower() if len(word) > 2 else word == name.lower():
-                return name
-    return None
+def _best(words: Sequence[str], names: Iterable[str], beside: str, measured: bool) -> str | None:
+    """Return the name that has one of some words: which it is, measured rather than computed, like the one beside it, by the first word."""
+    ranked = []
+    for order, name in enumerate(names):
+        plain = name.lower().replace("/", ".")
+        said = [
+            k for k, word in enumerate(words) if (word in plain if len(word) > 2 else word == plain)
+        ]
+        if said:
+            doubt, apart = doubt_of(name, beside)
+            ranked.append(
+                (name not in words, doubt if measured else 0, apart, said[0], order, name)
+            )
+    return min(ranked)[-1] if ranked else None
 
 
 def graph_of(

@@ -255,9 +255,9 @@ class Gears(NamedTuple):
 def nominal_torque(gears: Gears, motor: int, torque: float, speed: float) -> float:
     """Return the torque [N m] to ask of a motor by its nominal torque constant so that it gives ``torque``."""
     constant, peak = gears.constant[motor], gears.peak[motor]
-    lost = gears.load_friction * tanh(speed / SLIDING_SPEED)
     asked: float = torque / constant
     if gears.saturation > 0.0 or gears.load_friction > 0.0:
+        lost = gears.load_friction * tanh(speed / SLIDING_SPEED)
         for _ in range(_ROUNDS):
             load = min(abs(asked) / peak, 1.0) if peak > 0.0 else 0.0
             asked = (torque + lost * abs(asked)) / (

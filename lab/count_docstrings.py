@@ -35,12 +35,12 @@ Documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 
 
 class Docstring(NamedTuple):
-    """A docstring with its place; ``owner`` is the documented node, an assignment for a value."""
+    """A docstring with its place; ``arguments`` are the names that it may document, ``None`` if any."""
 
     path: str
     line: int
     text: str
-    owner: ast.AST
+    arguments: set[str] | None
 
     @property
     def is_one_line(self) -> bool:
@@ -105,7 +105,9 @@ def docstrings(path: str, text: str) -> list[Docstring]:
                 continue
             owner = node if before is None else before
             if isinstance(owner, (Documented, ast.Assign, ast.AnnAssign)):
-                found.append(Docstring(path, statement.lineno, statement.value.value, owner))
+                # not the node itself, which would keep the tree of the file in memory
+                given = arguments_of(owner)
+                found.append(Docstring(path, statement.lineno, statement.value.value, given))
     return sorted(found, key=lambda each: each.line)
 
 
@@ -123,12 +125,11 @@ def stale_arguments(found: list[Docstring]) -> list[str]:
     """List the names in sections ``Args:`` that are no argument, each with its place."""
     stale = []
     for each in found:
-        legal = arguments_of(each.owner)
-        if legal is not None:
+        if each.arguments is not None:
             stale += [
                 f"{each.place}: Args names {name!r}, which is no argument"
                 for name in documented_names(each.text)
-                if name not in legal
+                if name not in each.arguments
             ]
     return stale
 

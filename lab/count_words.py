@@ -168,8 +168,10 @@ def second_meanings(word: str, names: list[Name]) -> Iterator[Name]:
     known = WORDS[word]
     forms, classes = {word, *known.forms.split()}, set(known.classes.split())
     for name in names:
+        if not name.is_class or name.name in classes:
+            continue
         words = {each.lower() for each in re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", name.name)}
-        if name.is_class and words & forms and name.name not in classes:
+        if words & forms:
             yield name
 
 

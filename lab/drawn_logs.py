@@ -24,8 +24,15 @@ UNITS: dict[str, dict[str, float]] = {
 }  # fmt: skip
 """Units that files have with their factors, by the unit of a port."""
 STAMPS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-FORMATS = ("csv", "npz", "h5", "mat", "parquet", "mcap", "bag")
-TOPICS = {"imu": "/imu/data", "joints": "/joint_states", "truth": "/mocap/pose"}
+FORMATS = ("csv", "npz", "h5", "mat", "parquet", "mcap", "bag", "rrd")
+BAGS = ("mcap", "bag")
+"""Formats whose topics have clocks of their own."""
+RECORDED = {
+    "imu.angular_velocity": "imu.angular_velocity", "imu.specific_force": "imu.specific_force", "joints.position": "joints.position",
+    "joints.velocity": "joints.velocity", "joints.torque": "joints.torque", "truth.position": "truth.base_position",
+    "truth.quaternion": "truth.base_orientation",
+}  # fmt: skip
+"""Ports of a robot, by quantity."""
 
 
 @dataclass
@@ -51,7 +58,7 @@ class DrawnLog:
     seed: int
     kind: str
     stamps: dict[str, Numbers]
-    """Of each group, (n,) whole numbers or floats in ``unit``; of a bag in ns."""
+    """Of each group, or quantity with a topic of its own, (n,) whole numbers or floats in ``unit``; of a bag in ns."""
     unit: str
     quantities: dict[str, Quantity]
     params: dict[str, Any]
@@ -62,6 +69,14 @@ class DrawnLog:
     """Of the columns of a quaternion; ``quantities`` have x, y, z, w."""
     flaws: dict[str, str] = field(default_factory=dict)
     """The kind of mistake in a column, by quantity."""
+    played: DrawnLog | None = None
+    """Of a recording: the log that plays the robot of the run that is recorded."""
+
+    def stamps_of(self, quantity: str) -> Numbers:
+        """Return the stamps of a quantity, (n,): its own, or those of its group."""
+        parts = quantity.split(".")
+        names = [".".join(parts[: k + 1]) for k in reversed(range(len(parts)))]
+        return self.stamps[next(name for name in names if name in self.stamps)]
 
 
 class Drawing:
@@ -79,14 +94,20 @@ class Drawing:
         """Return true in a share of calls."""
         return bool(self.chance.random() < share)
 
-    def log(self) -> DrawnLog:
-        """Return a log."""
-        kind = self.one_of(*FORMATS)
-        bag = kind in ("mcap", "bag")
+    def log(self, kind: str | None = None) -> DrawnLog:
+        """Return a log, of some format, or of one and without mistakes."""
+        flawless, kind = kind is not None, kind or self.one_of(*FORMATS)
+        if kind == "rrd":
+            return self._recording()
+        bag = kind in BAGS
         unit = "ns" if bag else self.one_of(*STAMPS)
         rate = float(self.one_of(50, 100, 125, 200, 250, 333, 500, 1000))
         duration = 1.0 + self.chance.random()
         groups = ["imu", "joints", "contacts", "truth"]
+        if bag:
+            groups += [f"contacts.{foot.name}" for foot in self.robot.feet]
+        if bag and self.happens(0.3):
+            groups += ["imu.angular_velocity", "imu.specific_force"]
         whole = unit in ("us", "ns") or self.happens(0.3)
         epoch = self.one_of(0.0, 0.0, 12.5, 1.7e9)
         wrap = not bag and whole and unit in ("us", "ns") and epoch < 1e9 and self.happens(0.3)
@@ -94,7 +115,7 @@ class Drawing:
         times: dict[str, Numbers] = {}
         common = self._instants(rate, duration)
         for group in groups:
-            own = bag and group != "contacts" and self.happens(0.5)
+            own = bag and self.happens(0.5)
             if own:
                 own_rate = float(self.one_of(50, 100, 200, 400))
                 times[group] = self.chance.random() * 0.05 + self._instants(own_rate, duration)
@@ -121,6 +142,35 @@ class Drawing:
             drawn.params["begin"] = round(0.2 * self.chance.random(), 3)
         if self.happens(0.3):
             drawn.params["end"] = round(0.5 + 0.2 * self.chance.random(), 3)
+        if not flawless and self.happens(0.15):
+            self._spoil(drawn)
+        return drawn
+
+    def _recording(self) -> DrawnLog:
+        """Return a run that is recorded: a log plays its robot, and what the ports had is known when it has run."""
+        played = self.log("npz")
+        played.params = {
+            key: value for key, value in played.params.items() if key not in ("begin", "end")
+        }
+        drawn = DrawnLog(self.seed, "rrd", {}, "s", {}, {}, self.one_of(0.001, 0.002, 0.004, 0.01), played=played)  # fmt: skip
+        drawn.joints = [joint.name for joint in self.robot.joints]
+        for key in RECORDED:
+            if self.happens(0.8) or key.startswith("imu"):
+                drawn.quantities[key] = Quantity(np.zeros((1, 1)))
+        keys = drawn.quantities
+        if "joints.position" not in keys:
+            drawn.joints = []
+            for key in ("joints.velocity", "joints.torque"):
+                keys.pop(key, None)
+        if not {"truth.position", "truth.quaternion"} <= set(keys):
+            for key in ("truth.position", "truth.quaternion"):
+                keys.pop(key, None)
+        for foot in self.robot.feet:
+            if self.happens(0.5):
+                keys[f"contacts.{foot.name}.closed"] = Quantity(np.zeros((1, 1)))
+        drawn.params["between"] = self.one_of("linear", "hold", "mean")
+        if self.happens(0.3):
+            drawn.params["begin"] = round(0.2 * self.chance.random(), 3)
         if self.happens(0.15):
             self._spoil(drawn)
         return drawn
@@ -136,6 +186,8 @@ class Drawing:
         for _ in range(self.one_of(0, 0, 1, 2)):
             first = int(self.chance.integers(5, count - 5))
             keep[first : first + self.one_of(2, 9, 20)] = False
+        if self.happens(0.2):
+            keep &= self.chance.random(count) > 0.05
         keep[-3:] = True
         times = times[keep]
         if self.happens(0.2):
@@ -145,6 +197,7 @@ class Drawing:
 
     def _fill(self, drawn: DrawnLog, times: dict[str, Numbers]) -> None:
         params, own = drawn.params, drawn.quantities
+        bag = drawn.kind in BAGS
         ports = {"imu": {"angular_velocity": ("rad/s", 3), "specific_force": ("m/s^2", 3)}}
         names = [joint.name for joint in self.robot.joints]
         if self.happens(0.8):
@@ -161,21 +214,24 @@ class Drawing:
         if self.happens(0.7):
             ports["truth"] = {"position": ("m", 3)}
             turn = self.one_of("rpy", "quaternion")
-            if drawn.kind in ("mcap", "bag"):
+            if bag:
                 turn = "quaternion"
-            if turn == "quaternion" and drawn.kind not in ("mcap", "bag"):
+            if turn == "quaternion" and not bag:
                 drawn.order = self.one_of("xyzw", "wxyz")
             ports["truth"][turn] = ("rad", 3) if turn == "rpy" else ("", 4)
         for group, parts in ports.items():
             for part, (unit, width) in parts.items():
-                own[f"{group}.{part}"] = self._quantity(drawn, part, times[group], unit, width)
-        if drawn.kind not in ("mcap", "bag"):
-            for foot in [each.name for each in self.robot.feet][: self.one_of(0, 1, 2)]:
-                if self.happens(0.7):
-                    own[f"contacts.{foot}.force"] = self._quantity(drawn, "force", times["contacts"], "N", 1)  # fmt: skip
-                else:
-                    flags = (np.sin(3.0 * times["contacts"] + self.chance.random()) > 0)[:, None]
-                    own[f"contacts.{foot}.closed"] = Quantity(flags.astype(self.one_of(bool, np.int8, np.float64)))  # fmt: skip
+                at = times.get(f"{group}.{part}", times[group])
+                own[f"{group}.{part}"] = self._quantity(drawn, part, at, unit, width)
+        for foot in [each.name for each in self.robot.feet][: self.one_of(0, 1, 2)]:
+            own_topic = f"contacts.{foot}"
+            at = times[own_topic if own_topic in times else "contacts"]
+            if self.happens(0.7):
+                own[f"contacts.{foot}.force"] = self._quantity(drawn, "force", at, "N", 1)
+            else:
+                switches = 1 if bag else self.one_of(1, 1, 3)
+                flags = np.sin(np.outer(at, self.chance.uniform(2.0, 4.0, switches))) > 0
+                own[f"contacts.{foot}.closed"] = Quantity(flags.astype(self.one_of(bool, np.int8, np.float64)))  # fmt: skip
         if self.happens(0.5):
             params["imu"] = {
                 "position": self.chance.uniform(-0.1, 0.1, 3).round(3).tolist(),
@@ -197,7 +253,7 @@ class Drawing:
             meant /= np.linalg.norm(meant, axis=1, keepdims=True)
             meant *= np.where(self.chance.random(len(times)) < 0.1, -1.0, 1.0)[:, None]
         whole = part != "quaternion" and self.happens(0.15)
-        bag = drawn.kind in ("mcap", "bag")
+        bag = drawn.kind in BAGS
         chosen = self.one_of(*UNITS[unit]) if not bag and not whole else unit
         factor = UNITS[unit][chosen]
         quantity = Quantity(meant / factor, chosen, factor)
@@ -223,7 +279,7 @@ class Drawing:
 
     def _clock(self, drawn: DrawnLog, rate: float) -> None:
         """Draw how the clock is told, and rows out of order."""
-        if drawn.kind in ("mcap", "bag"):
+        if drawn.kind in BAGS:
             if self.happens(0.2):
                 drawn.params["clock"] = {"even": True}
             return
@@ -243,17 +299,22 @@ class Drawing:
 
     def _spoil(self, drawn: DrawnLog) -> None:
         """Note one to three mistakes that the file and the parameters will have, each at a quantity of its own."""
-        bag = drawn.kind in ("mcap", "bag")
+        bag = drawn.kind in BAGS
         kinds = [*{
-            "csv": ("column", "unit", "text", "lost"), "parquet": ("column", "unit", "text", "lost"),
-            "mcap": ("column", "unit", "text"), "bag": ("column", "unit", "text"),
-        }.get(drawn.kind, ("column", "unit", "text", "lost", "complex", "one row", "deep"))]  # fmt: skip
+            "rrd": (), "csv": ("text", "lost"), "parquet": ("text", "lost"), "mcap": ("text",), "bag": ("text",),
+        }.get(drawn.kind, ("text", "lost", "complex", "one row", "deep")), "column", "unit", "unit's name", "width"]  # fmt: skip
         self.chance.shuffle(kinds)
         places = list(drawn.quantities)
         self.chance.shuffle(places)
         drawn.flaws = dict(zip(places[: self.one_of(1, 2, 3)], kinds, strict=False))
         for place, kind in drawn.flaws.items():
-            if kind == "unit" and place.endswith((".quaternion", ".closed")):  # which have none
-                drawn.flaws[place] = "column"
+            if kind.startswith("unit") and place.endswith((".quaternion", ".closed")):
+                drawn.flaws[place] = "column"  # which have none
+            if kind == "width" and place.endswith(".closed"):
+                drawn.flaws[place] = "column"  # which has any
             if kind == "text" and bag and not drawn.joints:
                 drawn.flaws[place] = "column"
+        if drawn.joints and self.happens(0.3):
+            drawn.flaws["joints.names"] = "joint"
+        if any(place.startswith("contacts.") for place in places) and self.happens(0.3):
+            drawn.flaws["contacts"] = "foot"

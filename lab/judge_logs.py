@@ -2,7 +2,8 @@
 
 What every tick must have is worked out from the numbers that were written: pandas drops what is no number and rows of the same
 stamp, ``merge_asof`` holds, ``numpy.interp`` is linear, a sum of trapezia over all breakpoints is the mean, SciPy turns. Every value,
-mark and count is compared; a log with mistakes must be refused with all of them.
+mark and count is compared; a log with mistakes must be refused with all of them. Of a recording, the run's own signals are what was
+written.
 
 ::
 
@@ -24,8 +25,8 @@ from ..hal.log.log_file import LogError, read_log
 from ..hal.log.log_robot import LogRobot
 from ..hal.log.played_log import play
 from ..robots.description import find_robot
-from .drawn_logs import STAMPS, Drawing, DrawnLog, Numbers
-from .saved_logs import FLAWS, save
+from .drawn_logs import BAGS, STAMPS, Drawing, DrawnLog, Numbers
+from .saved_logs import FLAWS, misspelt, save
 
 LATE = 1e-6
 """A stamp may be so late and still be a tick's, as the contract of LogRobot says [s]."""
@@ -79,7 +80,7 @@ class Expected:
         self.drawn, self.robot = drawn, robot
         self.tables: dict[str, Table] = {}
         self.jitter = 0.0
-        self.first_instant = min(int(drawn.stamps[key.split(".")[0]].min()) for key in drawn.quantities) if drawn.kind in ("mcap", "bag") else None  # fmt: skip
+        self.first_instant = min(int(drawn.stamps_of(key).min()) for key in drawn.quantities) if drawn.kind in BAGS else None  # fmt: skip
         for key, quantity in drawn.quantities.items():
             values = quantity.meant.astype(float)
             if key == "truth.quaternion":
@@ -90,7 +91,7 @@ class Expected:
                     out=np.full_like(values, np.nan),
                     where=np.isfinite(norm) & (norm > 0),
                 )
-            self.tables[key] = self._table(key.split(".")[0], values)
+            self.tables[key] = self._table(key, values)
         begin = max(table.times[0] for table in self.tables.values())
         end = min(table.times[-1] for table in self.tables.values())
         params = drawn.params
@@ -100,16 +101,16 @@ class Expected:
         count = int((end - begin + LATE) // drawn.period) + 1
         self.ticks = begin + drawn.period * np.arange(count)
 
-    def _table(self, group: str, values: Numbers) -> Table:
+    def _table(self, key: str, values: Numbers) -> Table:
         pandas = import_module("pandas")
-        times, order = self._times(group)
+        times, order = self._times(key)
         rows = pandas.DataFrame(values[order]).assign(time=times)
         rows = rows.replace([np.inf, -np.inf], np.nan).dropna()
         rows = rows.drop_duplicates("time", keep="last")
         return Table(rows["time"].to_numpy(), rows.drop(columns="time").to_numpy())
 
-    def _times(self, group: str) -> tuple[Numbers, Numbers]:
-        drawn, counts = self.drawn, self.drawn.stamps[group]
+    def _times(self, key: str) -> tuple[Numbers, Numbers]:
+        drawn, counts = self.drawn, self.drawn.stamps_of(key)
         clock, rows = drawn.params.get("clock", {}), np.arange(len(counts))
         if "rate" in clock:
             return rows / clock["rate"], rows
@@ -211,7 +212,7 @@ class Expected:
             any_foot = True
             foot, _, what = key.removeprefix("contacts.").rpartition(".")
             force = table.values[:, 0]
-            state = force != 0
+            state = (table.values != 0).any(axis=1)
             if what == "force":
                 now, state = force[0] >= -5.0, np.zeros(len(force), bool)
                 for k, each in enumerate(force):
@@ -352,17 +353,24 @@ def judged(drawn: DrawnLog, robot: Any, folder: Path) -> tuple[str, list[str]]:
     except (LogError, ValueError) as error:
         return "refused", [str(error)]
     said = [f"{each.parameter}: {each.message}" for each in played.problems]
+    named = [each for each in played.problems if "has no joint" in each.message or "has no foot" in each.message]  # fmt: skip
+    unfixed = [each.parameter for each in played.problems if "has no column" in each.message and repr(misspelt(each.fix)) not in each.message]  # fmt: skip
     if drawn.flaws:
         missing = []
         for key, flaw in drawn.flaws.items():
-            place = key.rpartition(".")[0] if key.startswith("contacts") else key
+            place = key.rpartition(".")[0] if key.startswith("contacts.") else key
+            if place.startswith("contacts.") and "contacts" in drawn.flaws:
+                place += "t"  # as its foot is called there
             if not any(
                 line.startswith(f"{place}: ")
                 and any(each in line for each in FLAWS[flaw].split("|"))
                 for line in said
             ):
                 missing.append(f"{flaw} at {place} is not said: {said}")
-        if len(said) > len(drawn.flaws):
+        missing += [f"the fix of {each} is none" for each in unfixed]
+        missing += [f"{each} has no {part}" for each in named for part in ("expected", "found", "fix") if not getattr(each, part)]  # fmt: skip
+        feet = len(params["contacts"]) - 1 if "contacts" in drawn.flaws else 0
+        if len(said) > len(drawn.flaws) + feet:
             missing.append(f"more is said than the mistakes {drawn.flaws}: {said}")
         return ("a mistake not said" if missing else "refused, as is right"), missing
     expected = Expected(drawn, robot)

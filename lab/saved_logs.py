@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from .drawn_logs import DrawnLog, Numbers, Quantity
+from ..robots.description import find_robot
+from .drawn_logs import BAGS, RECORDED, DrawnLog, Numbers, Quantity
 
 FLAWS = {
     "column": "has no column", "unit": "expected a unit like", "text": "is text", "lost": "expected at least 2|is empty",
+    "width": " columns, expected ", "unit's name": "unit of ", "joint": "has no joint ", "foot": "has no foot ",
     "complex": "complex numbers", "one row": "has one row", "deep": "has 3 dimensions",
 }  # fmt: skip
 """Parts of the text that each mistake must have: one of them."""
@@ -26,15 +28,22 @@ FIELDS = {
 def save(drawn: DrawnLog, folder: Path) -> dict[str, Any]:
     """Write a drawn log; return the parameters of a LogRobot that plays it."""
     chance = np.random.default_rng((drawn.seed, 1))
-    bag = drawn.kind in ("mcap", "bag")
-    file, specs, names = _bag(drawn, folder, chance) if bag else _arrays(drawn, folder, chance)
+    bag = drawn.kind in BAGS
+    writer = _recording if drawn.played is not None else _bag if bag else _arrays
+    file, specs, names = writer(drawn, folder, chance)
     params: dict[str, Any] = {**drawn.params, "file": str(file)}
     for key, flaw in drawn.flaws.items():
-        if flaw == "lost":
-            specs[key] = ["odd_lost"] * drawn.quantities[key].raw.shape[1]
+        if key not in specs:
             continue
+        columns = specs[key]["columns"]
         specs[key] = {
+            "lost": ["odd_lost"] * drawn.quantities[key].raw.shape[1],
+            "width": [columns, columns] if isinstance(columns, str) else columns * 2,
+            "column": misspelt(columns)
+            if isinstance(columns, str)
+            else [misspelt(columns[0]), *columns[1:]],
             "unit": {**specs[key], "unit": "kg"},
+            "unit's name": {**specs[key], "unit": "furlongs"},
             "text": "joint_states.name" if bag else "odd_text",
         }.get(flaw, f"odd_{flaw.replace(' ', '_')}")
     for key, spec in specs.items():
@@ -49,11 +58,56 @@ def save(drawn: DrawnLog, folder: Path) -> dict[str, Any]:
             given[part] = spec
     if "joints" in params:
         params["joints"]["names"] = names or drawn.joints
+    if "joints.names" in drawn.flaws:
+        own = {joint.name for joint in find_robot("bruce").joints}
+        named = list(drawn.joints)
+        wrong = next(k for k, name in enumerate(named) if name in own)
+        named[wrong] += "e"
+        params["joints"]["names"] = named
+    if "contacts" in drawn.flaws:
+        params["contacts"] = {f"{foot}t": given for foot, given in params["contacts"].items()}
     if "truth.quaternion" in specs and not bag:
         params["truth"]["order"] = drawn.order
     if not any(key.startswith("imu") for key in specs):
         params.pop("imu", None)
     return params
+
+
+def misspelt(column: str) -> str:
+    """Return a column's name with a letter too many; an index stays behind it."""
+    name, bracket, index = column.partition("[")
+    return f"{name}e{bracket}{index}"
+
+
+def _recording(
+    drawn: DrawnLog, folder: Path, chance: np.random.Generator
+) -> tuple[Path, dict[str, Any], str | None]:
+    """Run a graph whose robot is a log, and record it; what its ports had becomes what is meant."""
+    from .. import load
+    from ..logs.recording.recorder import Recorder
+
+    assert drawn.played is not None
+    (folder / "played").mkdir()
+    params = save(drawn.played, folder / "played")
+    graph = {"rate": f"{1.0 / drawn.played.period:g} Hz", "robot": "bruce",
+             "blocks": {"robot": {"use": "hal.LogRobot", "with": params}}}  # fmt: skip
+    checked, robot = load(graph), find_robot("bruce")
+    run = checked.run(sinks=[Recorder(folder / "log.rrd")], run_hash=False)
+    feet = [foot.name for foot in robot.feet]
+    specs: dict[str, Any] = {}
+    for key in drawn.quantities:
+        if key in RECORDED:
+            columns: str | list[str] = f"robot.{RECORDED[key]}"
+            values = run.signal(f"robot.{RECORDED[key]}")
+        else:
+            foot = feet.index(key.split(".")[1])
+            points = [k for k, owner in enumerate(robot.foot_of_contact()) if owner == foot]
+            columns = [f"robot.contacts.closed[{point}]" for point in points]
+            values = run.signal("robot.contacts.closed")[:, points]
+        drawn.quantities[key] = Quantity(values)
+        specs[key] = _spec(columns, drawn.quantities[key])
+    drawn.stamps = dict.fromkeys(("imu", "joints", "contacts", "truth"), drawn.played.period * np.arange(len(values)))  # fmt: skip
+    return folder / "log.rrd", specs, None
 
 
 def _spec(columns: Any, quantity: Quantity, told: bool = False) -> dict[str, Any]:
@@ -96,6 +150,8 @@ def _arrays(
             values = np.asfortranarray(values)
         if values.ndim == 2 and values.shape[0] == values.shape[1]:
             values = raw[name]
+        if chance.random() < 0.3:  # as MATLAB's and robots' loggers write them
+            values = np.expand_dims(values, int(chance.integers(values.ndim + 1)))
         arrays[name] = values
     names = "joint_names" if drawn.joints and chance.random() < 0.5 else None
     file = folder / f"log.{drawn.kind}"
@@ -210,18 +266,11 @@ def _parquet(
     return file, {key: _spec(columns[key], each) for key, each in drawn.quantities.items()}, None
 
 
-def _bag(
-    drawn: DrawnLog, folder: Path, chance: np.random.Generator
-) -> tuple[Path, dict[str, Any], str | None]:
-    """Write a bag, whose topics have clocks of their own; arrivals are late."""
-    rosbag2, typesys = import_module("rosbags.rosbag2"), import_module("rosbags.typesys")
-    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
-    kinds, plugin = store.types, rosbag2.StoragePlugin
-    stamp, header = kinds["builtin_interfaces/msg/Time"], kinds["std_msgs/msg/Header"]
+def _topics(drawn: DrawnLog, kinds: Any) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return the topic, type and maker of messages of each group or quantity, and the field of each quantity."""
     vector, point = kinds["geometry_msgs/msg/Vector3"], kinds["geometry_msgs/msg/Point"]
-    four, nothing = kinds["geometry_msgs/msg/Quaternion"], np.zeros(9)
+    four, nothing, none = kinds["geometry_msgs/msg/Quaternion"], np.zeros(9), np.zeros(0)
     raw = {key: quantity.raw for key, quantity in drawn.quantities.items()}
-    none = np.zeros(0)
 
     def imu(head: Any, k: int) -> Any:
         return kinds["sensor_msgs/msg/Imu"](
@@ -238,8 +287,49 @@ def _bag(
         turn = four(*raw["truth.quaternion"][k].tolist())
         return kinds["geometry_msgs/msg/PoseStamped"](head, kinds["geometry_msgs/msg/Pose"](where, turn))  # fmt: skip
 
-    makers = {"imu": ("/imu/data", "sensor_msgs/msg/Imu", imu), "joints": ("/joint_states", "sensor_msgs/msg/JointState", joints),
-              "truth": ("/mocap/pose", "geometry_msgs/msg/PoseStamped", pose)}  # fmt: skip
+    def one_vector(key: str) -> Any:
+        return lambda head, k: kinds["geometry_msgs/msg/Vector3Stamped"](head, vector(*raw[key][k].tolist()))  # fmt: skip
+
+    def wrench(key: str) -> Any:
+        def make(head: Any, k: int) -> Any:
+            pushed = kinds["geometry_msgs/msg/Wrench"](vector(1.0, 2.0, float(raw[key][k, 0])), vector(3.0, 4.0, 5.0))  # fmt: skip
+            return kinds["geometry_msgs/msg/WrenchStamped"](head, pushed)
+
+        return make
+
+    def switch(key: str) -> Any:
+        return lambda head, k: kinds["std_msgs/msg/Bool"](bool(raw[key][k, 0]))
+
+    fields = dict(FIELDS)
+    makers: dict[str, Any] = {}
+    if "imu.angular_velocity" in drawn.stamps:
+        for key, part in (("imu.angular_velocity", "gyro"), ("imu.specific_force", "accel")):
+            makers[key] = (f"/imu/{part}", "geometry_msgs/msg/Vector3Stamped", one_vector(key))
+            fields[key] = f"imu_{part}.vector"
+    else:
+        makers["imu"] = ("/imu/data", "sensor_msgs/msg/Imu", imu)
+    makers["joints"] = ("/joint_states", "sensor_msgs/msg/JointState", joints)
+    makers["truth"] = ("/mocap/pose", "geometry_msgs/msg/PoseStamped", pose)
+    for key in raw:
+        foot = key.split(".")[1]
+        if key.endswith(".force"):
+            makers[key] = (f"/{foot}/wrench", "geometry_msgs/msg/WrenchStamped", wrench(key))
+            fields[key] = f"{foot}_wrench.wrench.force[2]"
+        elif key.endswith(".closed"):  # without a header: its arrival counts
+            makers[key] = (f"/{foot}/closed", "std_msgs/msg/Bool", switch(key))
+            fields[key] = f"{foot}_closed.data"
+    return makers, fields
+
+
+def _bag(
+    drawn: DrawnLog, folder: Path, chance: np.random.Generator
+) -> tuple[Path, dict[str, Any], str | None]:
+    """Write a bag, whose topics have clocks of their own; arrivals are late."""
+    rosbag2, typesys = import_module("rosbags.rosbag2"), import_module("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    kinds, plugin = store.types, rosbag2.StoragePlugin
+    stamp, header = kinds["builtin_interfaces/msg/Time"], kinds["std_msgs/msg/Header"]
+    makers, fields = _topics(drawn, kinds)
     way = plugin.SQLITE3 if drawn.kind == "bag" and chance.random() < 0.5 else plugin.MCAP
     writer = rosbag2.Writer(folder / "bag", version=9, storage_plugin=way)
     packed = chance.choice(["no", "message", "file"]) if drawn.kind == "bag" and way == plugin.SQLITE3 else "no"  # fmt: skip
@@ -253,18 +343,31 @@ def _bag(
     messages = []
     with writer:
         for group, (topic, kind, make) in makers.items():
-            if not any(key.startswith(group) for key in raw):
+            if not any(key.startswith(group) for key in drawn.quantities):
                 continue
             connection = writer.add_connection(topic, kind, typestore=store)
-            for k, count in enumerate(drawn.stamps[group].tolist()):
+            counts = drawn.stamps_of(group)
+            late = 0 if group.endswith(".closed") else chance.integers(0, 10**7, len(counts))
+            order = np.arange(len(counts))
+            arrivals = np.maximum.accumulate(counts + late - order) + order
+            if group.endswith(".closed"):
+                drawn.stamps[group] = arrivals
+            for k, (count, arrival) in enumerate(zip(counts.tolist(), arrivals.tolist(), strict=True)):  # fmt: skip
                 head = header(stamp=stamp(sec=count // 10**9, nanosec=count % 10**9), frame_id="base")  # fmt: skip
-                late = int(chance.integers(10**7))
-                messages.append((count + late, connection, store.serialize_cdr(make(head, k), kind)))  # fmt: skip
-        last: dict[int, int] = {}
-        for arrival, connection, data in messages:  # in the order of each topic's stamps
-            last[connection.id] = max(arrival, last.get(connection.id, 0) + 1)
-            writer.write(connection, last[connection.id], data)
+                messages.append((arrival, connection, store.serialize_cdr(make(head, k), kind)))
+        if chance.random() < 0.5:  # topics that are nobody's
+            for topic, kind, data in (
+                ("/battery", "std_msgs/msg/Float32", kinds["std_msgs/msg/Float32"](24.0)),
+                ("/log", "std_msgs/msg/String", kinds["std_msgs/msg/String"]("a word")),
+            ):
+                connection = writer.add_connection(topic, kind, typestore=store)
+                for arrival in sorted(chance.choice([each[0] for each in messages], 5)):
+                    messages.append((int(arrival), connection, store.serialize_cdr(data, kind)))
+        if chance.random() < 0.5:  # topics arrive in turns, as they do
+            messages.sort(key=lambda each: each[0])
+        for arrival, connection, data in messages:
+            writer.write(connection, arrival, data)
     found = folder / "bag"
     file = next(found.glob("*.mcap")) if drawn.kind == "mcap" else found
-    specs = {key: _spec(FIELDS[key], each) for key, each in drawn.quantities.items()}
+    specs = {key: _spec(fields[key], each) for key, each in drawn.quantities.items()}
     return file, specs, "joint_states.name" if drawn.joints and chance.random() < 0.5 else None

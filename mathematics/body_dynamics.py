@@ -244,9 +244,8 @@ def momentum_of(inertias: Inertias, body: int, spatial: Array1D, out: Array1D) -
 
 
 @kernel
-def body_inertia_and_wrench(tree: BodyTree, motion: BodyMotion, body: int, own: Inertias) -> None:
-    """Compute a body's own inertia, and the force that gives it its acceleration: f = I a + v x* I
-    v."""
+def body_inertia(tree: BodyTree, motion: BodyMotion, body: int, own: Inertias) -> None:
+    """Compute a body's own inertia."""
     mass = tree.mass[body]
     point_position(motion, body, tree.com[body], own.centre)
     x, y, z = own.centre[0], own.centre[1], own.centre[2]
@@ -260,6 +259,11 @@ def body_inertia_and_wrench(tree: BodyTree, motion: BodyMotion, body: int, own: 
     inertia[3] = inertia[3] - mass * x * y
     inertia[4] = inertia[4] - mass * x * z
     inertia[5] = inertia[5] - mass * y * z
+
+
+@kernel
+def body_wrench(motion: BodyMotion, body: int, own: Inertias) -> None:
+    """Compute the force that gives a body, of its own inertia, its acceleration: f = I a + v x* I v."""
     force, spatial = own.force[body], own.spatial
     momentum_of(own, body, motion.acceleration[body], force)
     momentum_of(own, body, motion.velocity[body], spatial)
@@ -279,10 +283,20 @@ def body_inertia_and_wrench(tree: BodyTree, motion: BodyMotion, body: int, own: 
 @kernel
 def composite_inertias(tree: BodyTree, motion: BodyMotion, composite: Inertias) -> None:
     """Compute the inertia and the force of every body with all that it carries."""
-    n_joints = motion.joint.shape[0]
-    for body in range(n_joints + 1):
-        body_inertia_and_wrench(tree, motion, body, composite)
-    for joint in range(n_joints - 1, -1, -1):
+    for body in range(motion.joint.shape[0] + 1):
+        body_inertia(tree, motion, body, composite)
+        body_wrench(motion, body, composite)
+    add_carried_inertias(tree, composite)
+    for joint in range(motion.joint.shape[0] - 1, -1, -1):
+        carrier, carried = tree.parent[joint], joint + 1
+        for k in range(6):
+            composite.force[carrier, k] = composite.force[carrier, k] + composite.force[carried, k]
+
+
+@kernel
+def add_carried_inertias(tree: BodyTree, composite: Inertias) -> None:
+    """Add to every body's own inertia those of all that it carries."""
+    for joint in range(tree.parent.shape[0] - 1, -1, -1):
         carrier, carried = tree.parent[joint], joint + 1
         composite.mass[carrier] = composite.mass[carrier] + composite.mass[carried]
         composite.moment[carrier, :] = composite.moment[carrier] + composite.moment[carried]
@@ -290,7 +304,6 @@ def composite_inertias(tree: BodyTree, motion: BodyMotion, composite: Inertias) 
             composite.inertia[carrier, k] = (
                 composite.inertia[carrier, k] + composite.inertia[carried, k]
             )
-            composite.force[carrier, k] = composite.force[carrier, k] + composite.force[carried, k]
 
 
 @kernel

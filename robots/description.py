@@ -12,7 +12,7 @@ from ..files.nodes import MapNode, plain
 from ..files.problems import Code, Problem, Problems
 from ..files.validation import locate
 from .element import Vector3
-from .importing.package_files import SCHEME, find_file, package_of
+from .importing.package_files import SCHEME, find_file, located, package_of
 from .importing.xacro_text import XACRO
 from .plausible_size import wrong_size
 from .robot_description import (
@@ -263,8 +263,6 @@ def _with_locations(robot: RobotDescription, folder: Path) -> RobotDescription:
     """Return the robot with meshes that are found from anywhere; a description in ``folder`` names them."""
     if not robot.looks:
         return robot
-    from .importing.looks import located
-
     looks = {
         link: look.model_copy(
             update={

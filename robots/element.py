@@ -2,8 +2,6 @@
 when they do not use what came later.
 """
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Annotated, Any, ClassVar
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,6 @@ from ..files.nodes import text_of
 from .language.errors import AloftError
 from .language.signal_error import FOLDER
 from .language.stages import CheckedGraph, ClockSpec
-from .links.path_ages import path_sinks
 from .loading import checked_again, checked_file, checked_text
 from .loading.checking.parameters import adjust
 from .running.executor import Executor
@@ -93,7 +91,10 @@ class Graph:
             if ticks < 1:
                 raise AloftError(f"a run of {duration} s is shorter than one tick")
         graph = self.checked if seed is None else self.with_seed(seed).checked
-        sinks = [*path_sinks(graph, clock.kind if clock is not None else ""), *sinks]
+        if graph.links.paths:
+            from .links.path_ages import path_sinks
+
+            sinks = [*path_sinks(graph, clock.kind if clock is not None else ""), *sinks]
         return Executor(
             graph,
             clock=clock,
@@ -143,6 +144,8 @@ class Graph:
 
         if is_provided("diagram_svg"):
             return str(provided("diagram_svg")(self.checked))
+        from html import escape
+
         return f"<pre>{escape(self.checked.text)}</pre>"
 
     def about(self) -> Mapping[str, Any]:

@@ -26,10 +26,11 @@ from ..runtime.language.errors import AloftError, RunError
 from ..runtime.language.parameter_change import Adjustment
 from ..runtime.language.parameters import is_live
 from ..runtime.loading.checking.parameters import adjust
-from ..runtime.running.memory import BoundGraph, Snapshot
+from ..runtime.running.memory import BoundGraph
 from ..runtime.running.run_result import RunResult
 from ..runtime.running.sink import Sink
 from ..runtime.running.sinks import RunHash
+from ..runtime.running.snapshot import Snapshot
 from ..runtime.running.stepping import SteppedRun
 from ..runtime.running.tick_calls import can_be_chained
 from .expansion import Job, seeded_graph

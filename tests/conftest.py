@@ -1,8 +1,10 @@
 """Settings for all tests."""
 
+import compileall
 import gc
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -31,9 +33,15 @@ gc.set_threshold(*COLLECTED_AFTER)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let each worker begin to collect all tests at another place. To rewrite the assertions takes twice
-    as long as the rest of it, and a worker reads from the cache what another one has rewritten."""
-    if hasattr(config, "workerinput") and config.args_source is config.ArgsSource.TESTPATHS:
+    """Compile the package once for all processes, as they keep no bytecode from the end of the collection
+    on. And let each worker begin to collect all tests at another place. To rewrite the assertions takes
+    twice as long as the rest of it, and a worker reads from the cache what another one has rewritten."""
+    if config.args_source is not config.ArgsSource.TESTPATHS:
+        return
+    if not hasattr(config, "workerinput"):
+        for folder in () if sys.dont_write_bytecode else ROOT.glob("[a-z]*/"):
+            compileall.compile_dir(folder, quiet=2, rx=re.compile("/tests/"))
+    else:
         folders = [ROOT / "tests", *ROOT.glob("extensions/*/tests"), ROOT / "lab" / "tests"]
         parts = sorted(
             part
@@ -56,9 +64,29 @@ def pytest_collection_finish() -> None:
     """Exempt what is collected from searches for garbage: every paced run makes one before it starts,
     which would take half a second among the modules of all tests. And cache no bytecode from here on:
     tests write blocks anew within the second and with the length by which Python tells old from new."""
-    gc.freeze()
+    _freeze()
     sys.dont_write_bytecode = True
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
+    """Exempt what the tests of a file have imported, too: the libraries that only some tests need have
+    more objects than all the others together."""
+    if nextitem is None or nextitem.path == item.path or len(sys.modules) < _modules + 100:
+        return
+    gc.collect()
+    _freeze()
+
+
+_modules = 0
+"""The number of modules when objects were frozen last."""
+
+
+def _freeze() -> None:
+    global _modules
+    gc.freeze()
+    _modules = len(sys.modules)
 
 
 @pytest.hookimpl(wrapper=True, optionalhook=True)

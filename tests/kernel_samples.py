@@ -18,14 +18,13 @@ from aloft.mathematics.compiling import numpy_numbers
 from aloft.mathematics.compiling.arguments import record_type
 from aloft.mathematics.compiling.kernel_registry import arguments_of, is_kernel
 from aloft.mathematics.landing_law import LandingCost, flight_map
+from aloft.mathematics.pushed_motion import PushedTurns, SeenMotion, Stretches, turn_memory
 from aloft.mathematics.whole_body_motion import (
     FixedPoints,
     GivenMotion,
     MotionTerms,
-    PushedTurns,
     motion_memory,
     set_poses_and_velocities,
-    turn_memory,
 )
 from aloft.mathematics.whole_body_qp import RigidBodyTerms
 from aloft.planner.library.jump_table import FlightRotation
@@ -191,16 +190,35 @@ EVALUATED = MotionTerms(
 IN_MOTION = motion_memory(10)
 set_poses_and_velocities(TREE, AT_TWO.position[1], AT_TWO.velocity[1], AT_TWO.bend[1], IN_MOTION)
 composite_inertias(TREE, IN_MOTION.motion, IN_MOTION.composite)
-TURNING = PushedTurns(
-    np.tile(np.eye(3), (5, 1, 1)), 0.1 * NORMAL((5, 3)), NORMAL((5, 3, 3)), np.array([0.01, 0.02]),
-    np.array([0, 2]), np.array([[0.1, 0.3, -0.2, 0.9]]), NORMAL((1, 3)), NORMAL((1, 3)),
+SEEN = SeenMotion(
+    *0.1 * NORMAL((3, 5, 3)), np.tile([1.0, 1.2, 0.9, 0.1, -0.2, 0.05], (5, 1)), np.tile(np.eye(3), (5, 1, 1)), NORMAL((5, 4, 3)),
 )  # fmt: skip
+PUSHED_TWICE = Stretches(
+    np.array([0.01, 0.02]), np.array([0.01, 0.03]), np.array([0, 2]),
+    np.array([[0.1, 0.2, 0.3, 0.1, 0.3, -0.2, 0.9]]), NORMAL((1, 6)), NORMAL((1, 4, 3)), *NORMAL((2, 1, 3)),
+)  # fmt: skip
+TURNING = PushedTurns(0.1 * NORMAL((5, 3)), NORMAL((5, 3, 3)), np.zeros((2, 4)), np.zeros((2, 3)))
 CAPSULES = NORMAL((2, 3, 3)), NORMAL((2, 3, 3)), np.array([0.05, 0.1])
 UNUSED = {
     "aloft.mathematics.segment_distances.bounded": (1.5,),
     "aloft.mathematics.segment_distances.segment_gap": tuple(NORMAL((4, 3))),
     "aloft.mathematics.segment_distances.capsule_gaps": (*CAPSULES, *CAPSULES, np.zeros((4, 3))),
     "aloft.mathematics.elementary.hypot": (0.3, -0.4),
+    "aloft.mathematics.interpolation.cubic_motion": (
+        *NORMAL((2, 4, 3)), np.array([0.0, 0.1, 0.1, 0.3]), np.array([0, 1, 2]), np.array([0.05, 0.0, 0.1]), *np.zeros((3, 3, 3)),
+    ),
+    "aloft.mathematics.euler_motion.euler_matrix": (*NORMAL((2, 3)), np.zeros((3, 3))),
+    "aloft.mathematics.euler_motion.turn_ahead": (NORMAL((3, 3)), NORMAL(6), np.zeros(3)),
+    "aloft.mathematics.euler_motion.turn_back": (NORMAL((3, 3)), NORMAL(6), np.zeros(3)),
+    "aloft.mathematics.euler_motion.motions_in_body": (
+        *NORMAL((2, 4, 3)), *NORMAL((2, 4, 9)), np.zeros((3, 3)), *np.zeros((2, 4, 9)),
+    ),
+    "aloft.mathematics.euler_motion.motions_in_world": (
+        *NORMAL((2, 4, 3)), NORMAL((4, 9)), np.zeros((3, 3)), np.zeros((4, 9)),
+    ),
+    "aloft.mathematics.linear_algebra.weighted_sum": (np.array([0.3, 0.0, -0.2]), NORMAL((3, 9)), np.ones(9)),
+    "aloft.mathematics.linear_algebra.pairwise_sum": (NORMAL(21),),
+    "aloft.mathematics.linear_algebra.add_multiple": (NORMAL(9), 0.3, NORMAL(9)),
     "aloft.mathematics.banded_system.assemble_normal": (
         CHAIN_STARTS, CHAIN_ROWS, NORMAL(6), np.array([1.0, 0.5, 2.0, 1.5]), np.arange(3), 3,
         np.zeros((3, 8)), *np.zeros((2, 3), dtype=np.int64), np.zeros(3),
@@ -254,6 +272,13 @@ UNUSED = {
     "aloft.mathematics.whole_body_motion.evaluate_motion": (
         TREE, SOLES_OF_TREE, AT_TWO, motion_memory(10), EVALUATED,
     ),
+    "aloft.mathematics.whole_body_motion.velocities_at_points": (
+        NORMAL((2, 10, 6)), np.arange(30).reshape(3, 10) % 3 > 0, NORMAL((2, 3, 3)), NORMAL((2, 10)),
+        np.zeros((6, 10)), np.zeros((2, 3, 6)),
+    ),
+    "aloft.mathematics.whole_body_motion.place_points": (
+        NORMAL((4, 3, 3)), NORMAL((4, 3, 9)), np.array([2, 0]), NORMAL((2, 3)), np.zeros((2, 4, 3)),
+    ),
     "aloft.mathematics.whole_body_motion.set_poses_at_instants": (
         TREE, AT_TWO.position, body_motion(10), np.zeros((2, 11, 3)), np.zeros((2, 11, 9)),
     ),
@@ -261,7 +286,11 @@ UNUSED = {
         TREE, AT_TWO.position[0], AT_TWO.velocity[0], AT_TWO.bend[0], motion_memory(10),
     ),
     "aloft.mathematics.whole_body_motion.momentum_terms": (
-        AT_TWO.velocity[1], 1, IN_MOTION, EVALUATED,
+        AT_TWO.velocity[1, 6:], IN_MOTION, *np.zeros((3, 3)), np.zeros(6),
+    ),
+    "aloft.mathematics.body_dynamics.add_carried_inertias": (TREE, IN_MOTION.composite),
+    "aloft.mathematics.pushed_motion.see_motion": (
+        TREE, SOLES_OF_TREE, 0.3 * NORMAL((5, 10)), NORMAL((5, 10)), motion_memory(10), SEEN,
     ),
     "aloft.mathematics.whole_body_motion.point_terms": (
         SOLES_OF_TREE, AT_TWO.position[0], 0, body_motion(10), EVALUATED,
@@ -275,11 +304,13 @@ UNUSED = {
     "aloft.mathematics.whole_body_motion.joint_torques": (
         TREE, SOLES_OF_TREE, AT_TWO, 1, IN_MOTION, EVALUATED,
     ),
-    "aloft.mathematics.whole_body_motion.turn_rate": (
-        TURNING, 1, 0, NORMAL(7), turn_memory(), np.zeros(7),
+    "aloft.mathematics.pushed_motion.turn_rate": (
+        np.eye(3), NORMAL(3), NORMAL(3), NORMAL((3, 3)), NORMAL(7), turn_memory(), np.zeros(7),
     ),
-    "aloft.mathematics.whole_body_motion.follow_turns": (
-        TURNING, turn_memory(), np.zeros((2, 4)), np.zeros((2, 3)),
+    "aloft.mathematics.pushed_motion.set_pushes": (SEEN, PUSHED_TWICE, 0, TURNING),
+    "aloft.mathematics.pushed_motion.follow_turns": (SEEN, PUSHED_TWICE, 0, turn_memory(), TURNING),
+    "aloft.mathematics.pushed_motion.follow_stretches": (
+        SEEN, PUSHED_TWICE, turn_memory(), TURNING, np.zeros((2, 3)), np.zeros((2, 6)),
     ),
     "aloft.mathematics.body_dynamics.rotation_jacobian": (
         TREE, body_motion(10), 5, np.zeros((3, 16)),

@@ -23,10 +23,10 @@ from aloft.blocks.signals import Phase
 from aloft.mathematics import arrays
 from aloft.mathematics.compiling.arguments import pack, type_of
 from aloft.mathematics.compiling.kernel_call import KernelCall
-from aloft.mathematics.compiling.kernel_registry import is_kernel, written_code
+from aloft.mathematics.compiling.kernel_registry import is_kernel, kernels, written_code
 from aloft.mathematics.compiling.machine_code import MachineCode
 from aloft.mathematics.compiling.translate import Translator
-from aloft.mathematics.kernel import expand, kernel, kernels
+from aloft.mathematics.kernel import expand, kernel
 from aloft.robots.description import find_robot
 from aloft.runtime.language import steps
 from aloft.runtime.language.extensions import own_extensions
@@ -64,6 +64,7 @@ NOT_HOT = {
     "hal.log.columns.with_hysteresis": "before a run, when the log is read",
     "hal.log.joint_columns._times": "before a run, when the log is read",
     "hal.log.log_file._no_column": "before a run, when the log is read",
+    "hal.log.tables._missing": "before a run, when the log is read",
     "hal.log.turns.quaternion_of_rpy": "before a run, when the log is read",
     "hal.log.turns.rates_of": "before a run, when the log is read",
     "hal.log.turns.rotation_of": "before a run, when the log is read",

@@ -252,19 +252,22 @@ class JumpPlan(Block):
     def _corrections(cls, task: JumpTask, params: Params, context: Context) -> tuple[Any, Any]:
         """Return the sum of the corrections from rehearsals and from the robot's own jumps; for both the same
         ``UnmetRequirement`` where a file is damaged."""
-        from ...planner.library.learnt import LearntFileError
-        from ...planner.library.rehearsed import RehearsalFileError
+        from ...planner.library.rehearsed import ZERO, RehearsalFileError
 
         try:
             rehearsed = cls._rehearsed(task, params, context)
         except RehearsalFileError as error:
             damaged = UnmetRequirement(str(error), fix=f"{context.path}.rehearsed: false")
             return damaged, damaged
-        try:
-            learnt = cls._learnt(task, params, context)
-        except LearntFileError as error:
-            damaged = UnmetRequirement(str(error), parameter="learnt")
-            return damaged, damaged
+        learnt = ZERO, ZERO
+        if params.learnt:
+            from ...planner.library.learnt import LearntFileError
+
+            try:
+                learnt = cls._learnt(task, params, context)
+            except LearntFileError as error:
+                damaged = UnmetRequirement(str(error), parameter="learnt")
+                return damaged, damaged
         velocity, momentum = (
             [a + b for a, b in zip(first, second, strict=True)]
             for first, second in zip(rehearsed, learnt, strict=True)
@@ -291,11 +294,8 @@ class JumpPlan(Block):
     def _learnt(cls, task: JumpTask, params: Params, context: Context) -> tuple[Vector, Vector]:
         """Return the corrections that the robot itself has learnt."""
         from ...planner.library.learnt import launch_of, read_learnt
-        from ...planner.library.rehearsed import ZERO
 
         assert context.robot is not None
-        if not params.learnt:
-            return ZERO, ZERO
         beside = context.folder / params.learnt
         path = beside if beside.is_file() else context.graph_folder / params.learnt
         return read_learnt(path, context.robot.name).correction(launch_of(task))

@@ -38,9 +38,12 @@ Record = Annotated[
 @contextmanager
 def recorder_started(*, wanted: bool) -> Iterator[RecorderLink | None]:
     """Start the recorder's process if one is wanted, while the graph is loaded."""
+    if not wanted:
+        yield None
+        return
     from ...logs.recording.recorder_link import start_early
 
-    link = start_early() if wanted else None
+    link = start_early()
     try:
         yield link
     finally:
@@ -51,11 +54,11 @@ def recorder_started(*, wanted: bool) -> Iterator[RecorderLink | None]:
 def open_viewer(live: Live, messages: list[str]) -> Viewer | None:
     """Open the viewer that shows the run. Without a viewer the run is not shown, and ``messages`` gets
     the reason."""
+    if live is Live.NONE:
+        return None
     from ...logs.viewing.viewer import ViewerError, start_viewer
     from .viewing import open_page
 
-    if live is Live.NONE:
-        return None
     try:
         viewer = start_viewer("web" if live is Live.WEB else "window")
     except ViewerError as error:

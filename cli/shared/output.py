@@ -6,55 +6,38 @@ import json
 import math
 import signal
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import typer
 
 from ...files.problems import LoadError
 from ...runtime.language.errors import AloftError, ExitCode, RunError
+from .plain_console import AS_IT_IS, NoProgress, PlainConsole, Table
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
-    from rich.table import Table
 
 
 SET_HELP = "Set a parameter: block.parameter=value. Repeatable."
-WIDE = 200
 
 
 def console(*, to_stderr: bool = False, quiet: bool = False) -> Console:
-    """Return Rich's console on standard output, or on standard error where JSON goes to the former."""
-    from rich.console import Console
-
-    made = Console(stderr=to_stderr, quiet=quiet, highlight=False)
-    if not made.is_terminal:
-        made.width = WIDE  # a file or a pipe has no edge to wrap at
-    return made
+    """Return Rich's console on standard output, or on standard error where JSON goes to the former; where that is no
+    terminal, one that prints what is simple without Rich."""
+    made = PlainConsole(to_stderr, quiet)
+    return cast("Console", made) if made.suffices() else made.rich
 
 
-def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """Make a table without boxes. Columns whose name starts with ``>`` are aligned to the right."""
-    from rich import box
-    from rich.markup import escape
-    from rich.table import Table
-
-    made = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
-    for column in columns:
-        right = column.startswith(">")
-        made.add_column(
-            escape(column.removeprefix(">")), justify="right" if right else "left", overflow="fold"
-        )
-    for row in rows:
-        made.add_row(*(escape(cell) for cell in row))
-    return made
+table = Table
+"""Makes a table from its title, its columns and the texts of its rows."""
 
 
 def say(out: Console, text: str) -> None:
     """Print a line as it is, without markup and without wrapping."""
-    out.print(text, markup=False, soft_wrap=True)
+    out.print(text, **AS_IT_IS)
 
 
 def number(value: Any) -> str:
@@ -135,6 +118,9 @@ def errors_reported(as_json: bool, *, traceback: bool = False) -> Iterator[None]
 @contextmanager
 def progress_bar(out: Console, text: str, total: int | None) -> Iterator[tuple[Progress, TaskID]]:
     """Show a progress bar that disappears at the end. It is not drawn if the output is no terminal."""
+    if not out.is_terminal:
+        yield cast("Progress", NoProgress(out)), cast("TaskID", 0)
+        return
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
@@ -143,7 +129,6 @@ def progress_bar(out: Console, text: str, total: int | None) -> Iterator[tuple[P
         TimeElapsedColumn(),
         console=out,
         transient=True,
-        disable=not out.is_terminal,
         refresh_per_second=5,
     ) as progress:
         yield progress, progress.add_task(text, total=total)

@@ -17,7 +17,6 @@ from .viewing import how_to_view
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
     from ...logs.recording.motion_recording import MotionRecording
     from ...planner.library.library import PlanLibrary
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
     from ...planner.task.task import JumpTask
     from ...robots.description import RobotDescription
     from ...studies.batch.plan_grid import GridRow
+    from .plain_console import Table
 
 
 SHOWN_STATISTICS = ("solver", "iterations", "cpu_s", "violation", "cost", "warm")
@@ -342,9 +342,9 @@ def plan_task(
 ) -> dict[str, Any]:  # fmt: skip
     """Plan one task, print and draw the plan, and return its row. Without ``tests`` those of a valid
     plan are not printed."""
-    from ...planner.checking.validity import InvalidPlanError
     from ...planner.solving.solver_process import cpu_time
     from ...planner.task.files import PlanError
+    from ...planner.task.plan import InvalidPlanError
 
     robot, started = library.robot, cpu_time()
     try:

@@ -27,7 +27,6 @@ from .output import (
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
-    from rich.table import Table
 
     from ...logs.recording.recorder import Recorder
     from ...logs.recording.recorder_link import RecorderLink
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from ...runtime.language.stages import CheckedGraph
     from ...runtime.running.real_time import RealTimeOptions
     from ...studies.batch.seeds import SeedRow
+    from .plain_console import Table
 
 
 class RunnableGraph(Protocol):
@@ -100,7 +100,6 @@ def run_once(
     """Run the graph, record and show it, and print the result; ``link`` is the recorder's process if
     it was started early, ``messages`` are warnings so far, and ``also`` is what else the JSON object
     has."""
-    from ...logs.recording.recorder import Recorder
     from ...runtime.running.freeze_guard import FreezeGuard
     from ...runtime.running.real_time import NO_REAL_TIME
     from .output import compiling_shown, progress_bar
@@ -108,6 +107,8 @@ def run_once(
     name, record, as_json = graph.checked.name, options.record, options.as_json
     recorder = None
     if record is not None or viewer is not None:
+        from ...logs.recording.recorder import Recorder
+
         live = viewer.source if viewer is not None else ""
         recorder = Recorder(
             record, keep=options.keep, split=options.split, live=live, link=link,

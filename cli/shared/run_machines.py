@@ -43,7 +43,8 @@ from .running_graphs import registered
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
+
+    from .plain_console import Table
 
 
 GRACE = 15.0

@@ -11,8 +11,9 @@ from collections.abc import Sequence
 
 from ...logs.replay.replay import Replayable, Replayed, ReplayError, replay
 from ...runtime.language.stages import CheckedGraph
-from ...runtime.running.memory import BoundGraph, Snapshot
+from ...runtime.running.memory import BoundGraph
 from ...runtime.running.sink import Sink
+from ...runtime.running.snapshot import Snapshot
 
 
 def snapshot_at(recorded: Replayable, tick: int) -> Snapshot:

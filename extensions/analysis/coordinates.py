@@ -18,7 +18,8 @@ from ...mathematics.arrays import Array, Indices
 from ...mathematics.rotations import multiply
 from ...runtime.language.errors import AloftError
 from ...runtime.language.selection import WHOLE, Selection, read_selection, select
-from ...runtime.running.memory import BoundGraph, Region
+from ...runtime.running.memory import BoundGraph
+from ...runtime.running.region import Region
 
 _AXES = "xyz"
 

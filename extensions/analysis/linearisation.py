@@ -30,7 +30,7 @@ from ...mathematics.arrays import Array, Flags
 from ...runtime.background.background_block import BackgroundBlock
 from ...runtime.graph import Graph, load
 from ...runtime.language.errors import AloftError
-from ...runtime.running.memory import Region
+from ...runtime.running.region import Region
 from ...runtime.running.stepping import SteppedRun
 from .coordinates import (
     Coordinates,

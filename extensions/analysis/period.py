@@ -12,7 +12,8 @@ import numpy as np
 
 from ...runtime.language.errors import AloftError
 from ...runtime.language.schedule import phases
-from ...runtime.running.memory import BoundGraph, Snapshot
+from ...runtime.running.memory import BoundGraph
+from ...runtime.running.snapshot import Snapshot
 from ...runtime.running.tick_calls import tick_calls
 from .coordinates import Coordinates
 

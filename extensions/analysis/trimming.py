@@ -25,7 +25,7 @@ from ...mathematics.arrays import Array
 from ...runtime.graph import Graph, load
 from ...runtime.language.errors import AloftError, UnitError
 from ...runtime.language.units import parse_quantity
-from ...runtime.running.memory import Snapshot
+from ...runtime.running.snapshot import Snapshot
 from ...runtime.running.stepping import SteppedRun
 from .coordinates import Coordinates, signal_coordinates, state_coordinates
 from .instant import bound_graph, go_to

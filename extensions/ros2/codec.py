@@ -276,6 +276,8 @@ class MessageType:
 
 Values = Mapping[str, NDArray[Any]]
 _OTHER = {"byte": "uint8", "octet": "uint8", "char": "uint8"}
+_OCTETS = ("byte", "octet")
+"""Numbers from 0 to 255 that rosbags takes for signed ones (findings/ros2_byte_and_char_in_two_readers.sh)."""
 CDR_HEADER = 4
 """Bytes before the message itself, which say how it is encoded."""
 
@@ -446,11 +448,13 @@ class Codec:
             if leaf.parts == "xyzw":
                 value[3] = 1.0
             return value
-        value = getattr(owner, name)
+        told = getattr(owner, name)
         if leaf.parts:
-            value = [getattr(value, part) for part in leaf.parts]
-        value = np.asarray(value, leaf.dtype)
-        return unit_quaternions(value, ".".join(leaf.path)) if leaf.parts == "xyzw" else value
+            told = [getattr(told, part) for part in leaf.parts]
+        found: NDArray[Any] = np.asarray(told, leaf.dtype)
+        if leaf.base in _OCTETS:
+            found &= 0xFF
+        return unit_quaternions(found, ".".join(leaf.path)) if leaf.parts == "xyzw" else found
 
     def _rank(self, message: Any) -> NDArray[np.int64] | None:
         """Return the places in the message's lists of the names in ``order``."""
@@ -564,5 +568,7 @@ def _put(owner: Any, leaf: Leaf, value: NDArray[Any]) -> None:
         value = np.clip(value, max(limits.min, -(2**63)), min(limits.max, 2**63 - 1))
     if value.ndim:
         np.copyto(getattr(owner, name), value, casting="unsafe")
+    elif leaf.base in _OCTETS:
+        setattr(owner, name, value.astype(np.int8).item())
     else:
         setattr(owner, name, value.item())

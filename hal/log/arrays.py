@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...mathematics.arrays import Array1D
+from .columns import MOST_APART, usual_step
 from .log_file import LogError, LogFile, bounded, usual_rows
 from .matlab_texts import matlab_texts
+
+_STAMPS = ("timestamps", "stamps", "time")
+"""Names of a group's stamps, the likeliest first."""
 
 
 def read_npz(path: Path) -> LogFile:
@@ -59,7 +65,26 @@ def read_hdf5(path: Path) -> LogFile:
             units[name] = unit.decode() if isinstance(unit, bytes) else unit
 
         file.visititems(visit)
-    return _filled(log, found, units)
+    return _with_own_stamps(_filled(log, found, units))
+
+
+def _with_own_stamps(log: LogFile) -> LogFile:
+    """Give arrays of a group, a structure of MATLAB, the stamps of that group as their own; those of an unknown unit are left alone."""
+    stamps: dict[str, Array1D] = {}
+    for name in _STAMPS:
+        for path, each in log.arrays.items():
+            group, _, own = path.rpartition("/")
+            if group and own == name and each.values.shape[1] == 1 and group not in stamps:
+                factor = {None: 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}.get(each.unit)
+                times = each.values[:, 0] * (factor or np.nan)
+                if usual_step(times) <= MOST_APART:
+                    stamps[group] = times
+    first = min((float(times[0]) for times in stamps.values()), default=0.0)
+    for path, each in log.arrays.items():
+        own_stamps = stamps.get(path.rpartition("/")[0])
+        if own_stamps is not None and len(own_stamps) == len(each.values):
+            log.arrays[path] = replace(each, stamps=own_stamps - first)
+    return log
 
 
 class _NoColumnError(Exception):

@@ -192,6 +192,7 @@ def _gather(path: Path, topics: dict[str, _Topic]) -> None:
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     size = 0
     with highlevel.AnyReader([path], default_typestore=store) as reader:
+        _read_unsigned(reader.typestore.fielddefs)
         kinds = {each.topic: each.msgtype for each in reader.connections}
         short = Counter(_short(topic) for topic in kinds)
         for topic in kinds:
@@ -212,6 +213,18 @@ def _gather(path: Path, topics: dict[str, _Topic]) -> None:
                     continue
                 size += 8 * found.add(message, arrival)
                 bounded(path, size)
+
+
+def _read_unsigned(definitions: dict[str, Any]) -> None:
+    """Let ``byte``, which rosbags takes for signed, be the octet that ROS 2 has (findings/ros2_byte_and_char_in_two_readers.sh)."""
+    for name, (constants, fields) in list(definitions.items()):
+        definitions[name] = constants, tuple((field, _unsigned(node)) for field, node in fields)
+
+
+def _unsigned(node: Any) -> Any:
+    if isinstance(node, tuple):
+        return tuple(_unsigned(part) for part in node)
+    return "uint8" if node == "byte" else node
 
 
 def _short(topic: str) -> str:

@@ -27,7 +27,11 @@ _ENDINGS = {
 
 
 class LogError(ValueError):
-    """A file that is no log, or lacks what was asked of it; the text says what, and what is there."""
+    """A file that is no log, or lacks what was asked of it; the text says what, and what is there, ``fix`` what was meant."""
+
+    def __init__(self, text: str, fix: str = "") -> None:
+        super().__init__(text)
+        self.fix = fix
 
 
 @dataclass(frozen=True)
@@ -79,7 +83,8 @@ class LogFile:
         near = get_close_matches(stem, known, 3, 0.5)
         raise LogError(
             f"{self.path.name} has no column {name!r}; "
-            f"{'similar are' if near else 'it has'} {', '.join(near or known[:12])}"
+            f"{'similar are' if near else 'it has'} {', '.join(near or known[:12])}",
+            near[0] + name[len(stem) :] if near else "",
         )
 
     def put(self, name: str, found: Any, rows: int | None = None, unit: str | None = None) -> None:
@@ -102,6 +107,8 @@ class LogFile:
             missing = np.isnat(numbers)
             count = numbers.astype(f"{numbers.dtype.kind}8[ns]").astype(np.int64)
             numbers, unit = (np.where(missing, np.nan, count) if missing.any() else count), "ns"
+        if numbers.ndim > 2:  # MATLAB's loggers write columns x 1 x rows
+            numbers = numbers.squeeze()
         reason = _no_column(numbers)
         if reason:
             self.refused[name] = reason

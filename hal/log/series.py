@@ -34,6 +34,11 @@ class Series:
         steps = np.diff(self.stamps, append=self.stamps[-1])
         return steps > GAP * usual_step(self.stamps)
 
+    def spread(self) -> float:
+        """Return the standard deviation of the steps between rows, relative to their mean, without gaps."""
+        steps = np.diff(self.stamps)[~self.gaps()[:-1]]
+        return float(steps.std() / steps.mean()) if steps.any() else 0.0
+
     def validity(self, times: Array1D, repeated: Flags) -> tuple[Flags, Array1D]:
         """Return at each time (m,) whether the last sample is a new one and no gap is there, and the sample's age [s].
 

@@ -18,6 +18,8 @@ from ...robots.robot_description import RobotDescription
 
 RATE, SPEED, TILT, HEIGHT = 0.1, 0.05, 0.06, 0.02
 """Motion of a standing foot of a real leg, with its encoders' offsets: rad/s, m/s, rad and m."""
+THIN = 0.005
+"""A sole whose points are less off a line is one [m]."""
 OUTLYING = 3.0
 """Times that, above which more counts hardly more."""
 MOST_ROWS = 240
@@ -62,9 +64,19 @@ class StandingFeet:
             None if each is None else each[self.rows]
             for each in (motion.rate, motion.up, motion.speed)
         )
-        self._normals = [self._standing(foot)[0].T[:, 2] for foot in range(len(self.chains))]
+        self._normals = [self._normal(foot) for foot in range(len(self.chains))]
         self._turned: dict[tuple[int, int], Array] = {}
         self._feet: dict[tuple[int, tuple[int, ...]], tuple[Array, ...]] = {}
+
+    def _normal(self, foot: int) -> Array:
+        """Return a sole's normal in its link's axes, by its points; of a line or a ball as it stands."""
+        upright: Array = self._standing(foot)[0].T[:, 2]
+        own = np.array(self.robot.foot_of_contact()) == foot
+        points = np.array([each.position for each in self.robot.contacts])[own]
+        if len(points) < 3:
+            return upright
+        _, sizes, axes = np.linalg.svd(points - points.mean(axis=0))
+        return axes[2] * np.sign(axes[2] @ upright) if sizes[1] > THIN else upright
 
     def unrest(self, columns: Mapping[int, int]) -> float:
         """Return the unrest with the column of each joint in ``joints``."""
@@ -124,7 +136,13 @@ class StandingFeet:
                 rate = rate + axis * speed
                 turn = turn @ self._turn(j, column)  # frames of links are parallel at zero
         arm = turn @ np.array(self.robot.feet[foot].sole)
-        found = place + arm, turn @ self._normals[foot], rate, moving + cross_products(rate, arm)
+        normal = self._normals[foot]
+        if self.up is not None and self.robot.foot_of_contact().count(foot) == 1:
+            # of a ball it is not known: as it stands on the mean
+            own = np.einsum("nji,nj->ni", turn, self.up)[self.closed[:, foot]]
+            normal = own.mean(axis=0) if len(own) else normal
+            normal = normal / max(float(np.linalg.norm(normal)), 1e-9)
+        found = place + arm, turn @ normal, rate, moving + cross_products(rate, arm)
         if len(self._feet) > MOST_KEPT:
             self._feet.clear()
         self._feet[foot, columns] = found

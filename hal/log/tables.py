@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import io
 import re
+from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -28,6 +30,8 @@ _SPELLINGS = {
 """Units as the headers of tables have them, and as they are written here."""
 _HEAD = 65536
 """Bytes from which a table's header, separator and decimal sign are told."""
+_PART = 2_000_000
+"""Bytes of text that are read at once."""
 
 
 class _Head(NamedTuple):
@@ -45,26 +49,55 @@ def read_csv(path: Path) -> LogFile:
     """Read a CSV file with the columns' names in its first line, before which there may be comments."""
     bounded(path, path.stat().st_size)
     head = _head_of(path)
+    return _filled(LogFile(path), _csv_parts(path, head), head.names, head.units)
+
+
+def _csv_parts(path: Path, head: _Head) -> Iterator[Any]:
+    """Give the rows part by part: Arrow would keep the text of all rows until it knows the types of the last."""
     arrow = import_module("pyarrow.csv")
-    table = arrow.read_csv(
-        path,
-        read_options=arrow.ReadOptions(
-            use_threads=False,
-            skip_rows=head.lines,
-            autogenerate_column_names=True,
-            encoding=head.encoding,
-        ),
-        parse_options=arrow.ParseOptions(
-            delimiter=head.separator,
-            invalid_row_handler=lambda row: "skip" if row.text.startswith(("#", "%")) else "error",
-        ),
-        convert_options=arrow.ConvertOptions(decimal_point=head.decimal),
-    )
-    if table.num_columns != len(head.names):
-        raise LogError(
-            f"{path.name}: rows have {table.num_columns} values, and the header {len(head.names)} names"
-        )
-    return _filled(LogFile(path), table, head.names, head.units)
+    wrong: list[Any] = []
+
+    def odd(row: Any) -> str:
+        if row.text.startswith(("#", "%")):
+            return "skip"
+        wrong.append(row)
+        return "error"
+
+    lines = 0
+    with path.open("rb") as file:
+        while text := _whole_lines(file):
+            try:
+                yield arrow.read_csv(
+                    io.BytesIO(text),
+                    read_options=arrow.ReadOptions(
+                        use_threads=False,
+                        skip_rows=0 if lines else head.lines,
+                        column_names=[str(k) for k in range(len(head.names))],
+                        encoding=head.encoding,
+                    ),
+                    parse_options=arrow.ParseOptions(
+                        delimiter=head.separator, invalid_row_handler=odd
+                    ),
+                    convert_options=arrow.ConvertOptions(decimal_point=head.decimal),
+                )
+            except ValueError:
+                if not wrong:
+                    raise
+                raise LogError(
+                    f"{path.name}: line {lines + wrong[0].number} has {wrong[0].actual_columns} values, and the header "
+                    f"{len(head.names)} names"
+                ) from None
+            lines += max(text.count(b"\n"), text.count(b"\r"))
+
+
+def _whole_lines(file: BinaryIO) -> bytes:
+    """Return the next lines, about ``_PART`` bytes of them; empty at the end."""
+    text = file.read(_PART)
+    while text and (rest := file.readline(_PART)):
+        text += rest
+        if rest.endswith(b"\n"):
+            break
+    return text
 
 
 def _head_of(path: Path) -> _Head:
@@ -151,26 +184,43 @@ def _named(title: str) -> tuple[str, str | None]:
 
 def read_parquet(path: Path) -> LogFile:
     """Read a Parquet file; fields of structures are columns called ``structure.field``."""
-    kinds = import_module("pyarrow.types")
-    with import_module("pyarrow.parquet").ParquetFile(path) as file:
+    with import_module("pyarrow.parquet").ParquetFile(path, pre_buffer=False) as file:
         bounded(path, 8 * file.metadata.num_rows * file.metadata.num_columns)
-        table = file.read()
+        flat = _flat(file.schema_arrow.empty_table())
+        units = [
+            ((each.metadata or {}).get(b"unit") or b"").decode() or None for each in flat.schema
+        ]
+        return _filled(LogFile(path), map(_flat, file.iter_batches()), flat.column_names, units)
+
+
+def _flat(rows: Any) -> Any:
+    """Return a table, or a batch of one, with fields of structures as columns."""
+    pyarrow, kinds = import_module("pyarrow"), import_module("pyarrow.types")
+    table = rows if isinstance(rows, pyarrow.Table) else pyarrow.Table.from_batches([rows])
     while any(kinds.is_struct(each.type) for each in table.schema):
         table = table.flatten()
-    units = [((each.metadata or {}).get(b"unit") or b"").decode() or None for each in table.schema]
-    return _filled(LogFile(path), table, table.column_names, units)
+    return table
 
 
-def _filled(log: LogFile, table: Any, names: list[str], units: list[str | None]) -> LogFile:
-    for k, name in enumerate(names):
+def _filled(
+    log: LogFile, parts: Iterable[Any], names: list[str], units: list[str | None]
+) -> LogFile:
+    """Keep the columns of a table that comes part by part."""
+    columns = [_Column() for _ in names]
+    for name in names:
         if names.count(name) > 1:
             log.refused[name] = f"is the name of {names.count(name)} columns"
-            continue
-        column = table.column(k)
-        try:
-            log.put(name, _values(column), table.num_rows, units[k])
-        except _NoNumbersError as error:
-            log.refused[name] = str(error)
+    for part in parts:
+        for k, name in enumerate(names):
+            try:
+                if name not in log.refused:
+                    columns[k].add(part.column(k))
+            except _NoNumbersError as error:
+                log.refused[name] = str(error)
+                columns[k] = _Column()
+    for name, column, unit in zip(names, columns, units, strict=True):
+        if name not in log.refused:
+            log.put(name, column.values, column.rows, unit)
     return log
 
 
@@ -178,21 +228,73 @@ class _NoNumbersError(Exception):
     """A column that is none of numbers; the text says what it is."""
 
 
-def _values(column: Any) -> Array:
-    """Return the numbers of a column of Arrow's, (n,) or (n, k); what is missing is no number."""
+class _Column:
+    """The numbers of a column, in one array ``values`` (rows,) or (rows, k) that grows part by part."""
+
+    def __init__(self) -> None:
+        self.values: Array = np.zeros(0)
+        self.rows, self.kind = 0, ""
+
+    def add(self, part: Any) -> None:
+        """Take a part of Arrow's; types may become wider from part to part.
+
+        Raises:
+            _NoNumbersError: it has no numbers, or they are of another kind than before.
+        """
+        before, self.rows = self.rows, self.rows + len(part)
+        kinds = import_module("pyarrow.types")
+        found = _values(part, before)
+        if found is None:  # nothing is known of it, but that it is missing
+            if self.kind:
+                self._grow(self._missing(self.values, len(part)))
+            return
+        truths, moments = kinds.is_boolean(part.type), kinds.is_temporal(part.type)
+        kind = "truths" if truths else "moments" if moments else "numbers"
+        if self.kind and (kind, found.shape[1:]) != (self.kind, self.values.shape[1:]):
+            if kind == self.kind:
+                widths = sorted((self.values.shape[1], found.shape[1]))
+                raise _NoNumbersError(f"has lists of different lengths, {widths[0]} to {widths[1]}")
+            raise _NoNumbersError(f"has {self.kind} first, and {kind} from row {before} on")
+        if not self.kind:
+            self.kind = kind
+            self.values = self._missing(found, before) if before else found[:0].copy()
+        self._grow(found)
+
+    def _grow(self, found: Array) -> None:
+        rows, kind = len(self.values), np.result_type(self.values, found)
+        if kind != self.values.dtype:
+            self.values = self.values.astype(kind)
+        # in place: what was read is not copied, and no old array stands beside the new one
+        self.values.resize((rows + len(found), *found.shape[1:]), refcheck=False)
+        self.values[rows:] = found
+
+    @staticmethod
+    def _missing(like: Array, rows: int) -> Array:
+        """Return rows that are missing in a column."""
+        shape = (rows, *like.shape[1:])
+        if like.dtype.kind in "Mm":
+            return np.full(shape, "NaT", like.dtype)
+        return np.full(shape, np.nan)
+
+
+def _values(column: Any, before: int) -> Array | None:
+    """Return the numbers of a part of a column, (n,) or (n, k), behind rows ``before`` it; what is missing is no number, and none
+    is returned where all are."""
     pyarrow, kinds = import_module("pyarrow"), import_module("pyarrow.types")
     kind = column.type
     if kinds.is_dictionary(kind):
         column, kind = column.cast(kind.value_type), kind.value_type
     if kinds.is_null(kind):
-        raise _NoNumbersError("is empty")
+        return None
     if kinds.is_string(kind) or kinds.is_large_string(kind):
-        return _numbers_of(column)
+        return _numbers_of(column, before)
     if kinds.is_list(kind) or kinds.is_large_list(kind) or kinds.is_fixed_size_list(kind):
         rows = column.to_pylist()
         widths = {len(row) for row in rows if row is not None}
-        if len(widths) != 1:
-            raise _NoNumbersError(f"has lists of different lengths, {min(widths, default=0)} to {max(widths, default=0)}")  # fmt: skip
+        if not widths:
+            return None
+        if len(widths) > 1:
+            raise _NoNumbersError(f"has lists of different lengths, {min(widths)} to {max(widths)}")
         nothing = [None] * widths.pop()
         return np.array([nothing if row is None else row for row in rows], np.float64)
     if kinds.is_decimal(kind):
@@ -207,8 +309,8 @@ def _values(column: Any) -> Array:
     return values
 
 
-def _numbers_of(column: Any) -> Array:
-    """Return the numbers in texts, such as those with blanks around them.
+def _numbers_of(column: Any, before: int) -> Array:
+    """Return the numbers in texts, such as those with blanks around them, behind rows ``before`` them.
 
     Raises:
         _NoNumbersError: they are no numbers; the text names the first one.
@@ -218,4 +320,4 @@ def _numbers_of(column: Any) -> Array:
         return np.array([np.nan if text is None else float(text) for text in texts])
     except ValueError:
         row = next(k for k, text in enumerate(texts) if text is not None and not _is_number(text))
-        raise _NoNumbersError(f"is text: row {row} has {texts[row]!r}") from None
+        raise _NoNumbersError(f"is text: row {before + row} has {texts[row]!r}") from None

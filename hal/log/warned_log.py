@@ -63,7 +63,7 @@ def _of_clock(played: PlayedLog, params: LogParameters, taken: Sequence[Series])
     for what, share in (("IMU", played.imu_repeats), ("joints", played.joint_repeats)):
         if share > MANY_REPEATS:
             yield f"{100.0 * share:.1f} % of the samples of the {what} repeat the one before exactly: they were not renewed"
-    spread = max(_spread(series) for series in taken)
+    spread = max(series.spread() for series in taken)
     if spread > MOST_JITTER and not params.clock.even:
         yield (
             f"the steps between stamps vary by {100.0 * spread:.0f} % of their mean: if they are arrival times, "
@@ -82,12 +82,6 @@ def _of_clock(played: PlayedLog, params: LogParameters, taken: Sequence[Series])
             f"clock.even: half of the rows are more than {shift.shift:.3g} s off their stamps, so rows are missing: an even "
             "grid is wrong there"
         )
-
-
-def _spread(series: Series) -> float:
-    """Return the standard deviation of the steps between rows, relative to their mean, without gaps."""
-    steps = np.diff(series.stamps)[~series.gaps()[:-1]]
-    return float(steps.std() / steps.mean()) if steps.size else 0.0
 
 
 def _of_joints(params: LogParameters, robot: RobotDescription, rows: PlayedRows) -> Iterator[str]:

@@ -32,7 +32,6 @@ from difflib import get_close_matches
 from importlib import import_module
 from math import prod
 from pathlib import Path
-from pkgutil import iter_modules
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -234,10 +233,8 @@ _found: dict[str, type[MountedSensor]] = {}
 
 def sensor_kinds() -> dict[str, type[MountedSensor]]:
     """Return the kinds of sensors of this folder that a description can mount on a link."""
-    modules = [
-        import_module(f"{_PACKAGE}.{module.name}")
-        for module in iter_modules([str(Path(__file__).parent)])
-    ]
+    names = sorted(path.stem for path in Path(__file__).parent.glob("[!_]*.py"))
+    modules = [import_module(f"{_PACKAGE}.{name}") for name in names]
     classes = [each for module in modules for each in vars(module).values()]
     return {
         each.kind: each

@@ -26,8 +26,8 @@ from ...runtime.language.errors import AloftError
 from ...runtime.language.parameters import Parameters
 from ...runtime.language.stages import ClockSpec
 from ...runtime.running.executor import Executor
-from ...runtime.running.memory import nameless_memory
 from ...runtime.running.real_time import NO_REAL_TIME, RealTimeOptions
+from ...runtime.running.snapshot import nameless_memory
 from ...runtime.testing.graphs import BlockUse, checked_graph
 
 RATE, TICKS = 500.0, 4000

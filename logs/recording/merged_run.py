@@ -23,8 +23,9 @@ from ...runtime.links.lockstep_link import LinkInput
 from ...runtime.links.part import MergedLayout
 from ...runtime.links.path_ages import MAX_TICKS, check_path_ages, timeline_of
 from ...runtime.placement.placed import PlacedGraph
-from ...runtime.running.memory import Memory, Snapshot
+from ...runtime.running.memory import Memory
 from ...runtime.running.sink import Note
+from ...runtime.running.snapshot import Snapshot
 from ..file.format import Header, RecordedBlock
 from ..file.header import make_header
 from ..file.packed_rows import TickRows

@@ -11,7 +11,7 @@ that nobody contends for is taken and given back in between, which POSIX says sy
 reading the counter and reading records, and besides believes no record whose two sequence numbers
 are not the one that is due.
 
-The memory has no name, see ``runtime.running.memory.nameless_memory``: the reader keeps what a writer that
+The memory has no name, see ``runtime.running.snapshot.nameless_memory``: the reader keeps what a writer that
 is killed had written.
 """
 

@@ -32,7 +32,8 @@ from ...runtime.language.parameter_change import ParameterChange
 from ...runtime.language.stages import CheckedGraph
 from ...runtime.loading import checked_again, flattened_text
 from ...runtime.loading.flattening.change import change
-from ...runtime.running.memory import BoundGraph, Snapshot
+from ...runtime.running.memory import BoundGraph
+from ...runtime.running.snapshot import Snapshot
 from ..file.code import NeededCode, code_of, expect_trusted, remember
 from ..file.dependencies import digests, files_read, named_file, other_files, unpacked
 from ..file.format import Header

@@ -32,10 +32,11 @@ from ...runtime.language.stages import BlockSpec, CheckedGraph, ClockSpec
 from ...runtime.loading.checking.parameters import adjust
 from ...runtime.running.differences import Difference, RowComparison, Translation
 from ...runtime.running.executor import Executor
-from ...runtime.running.memory import BoundGraph, Snapshot
+from ...runtime.running.memory import BoundGraph
 from ...runtime.running.playback import Playback, PlaybackBlock, playback_graph
 from ...runtime.running.run_result import RunResult
 from ...runtime.running.sink import Note, Sink
+from ...runtime.running.snapshot import Snapshot
 
 
 class Replayable(Protocol):

@@ -8,16 +8,15 @@ division by zero to Python.
 from __future__ import annotations
 
 import ctypes
-from collections import namedtuple
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from operator import itemgetter
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .failures import FAILURES, Failure
-from .machine_code import ENTRY, machine_code_of
 
 HEADER = 2
 """The number of words before the arguments."""
@@ -71,9 +70,18 @@ class RecordType:
 def record_type(name: str, fields: tuple[str, ...]) -> type:
     """Make the named tuple of some fields of a signal or of parameters: one class for each
     choice."""
-    made = namedtuple(name, fields)  # type: ignore[misc]  # the names are known only now
-    made.__module__ = __name__
-    return made
+    # A start makes a hundred and more; ``namedtuple`` takes six times as long, as it compiles each a ``__new__``.
+    parts = {field: property(itemgetter(place)) for place, field in enumerate(fields)}
+    return type(
+        name, (_Record,), {"__slots__": (), "__module__": __name__, "_fields": fields, **parts}
+    )
+
+
+class _Record(tuple[Any, ...]):
+    __slots__ = ()
+
+    def __new__(cls, *parts: Any) -> Self:
+        return super().__new__(cls, parts)
 
 
 def _same_record(name: str, fields: tuple[str, ...], parts: tuple[ArgumentType, ...]) -> RecordType:
@@ -139,12 +147,16 @@ def error_record() -> NDArray[np.int64]:
 @cache
 def _error_words() -> tuple[int, int]:
     """Return the address of the function that reports an error, and that of its record."""
+    from .machine_code import machine_code_of
+
     return machine_code_of(_report_module).address, int(error_record().ctypes.data)
 
 
 def _report_module() -> Any:
     """Make the function that reports an error: it sets it for Python and marks it in the record."""
     from llvmlite import ir
+
+    from .machine_code import ENTRY
 
     word, text = ir.IntType(64), ir.IntType(8).as_pointer()
     module = ir.Module("aloft.report")

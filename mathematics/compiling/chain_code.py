@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arguments import error_record
-from .machine_code import ENTRY, machine_code_of
 
 ERROR_FLAG, CLOCK, ENTRIES, NEXT, RUNNING, CURSOR = range(6)
 """The words at the beginning of a table: the address of the word in which kernels report an error;
@@ -46,6 +45,8 @@ def chain_function() -> Callable[[ctypes.c_size_t], int]:
     entries made so far, and goes on behind it when it is called again. A Python error that a call
     has set is raised; then ``NEXT`` is the entry that failed.
     """
+    from .machine_code import machine_code_of
+
     code = machine_code_of(_module)
     function: Any = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_size_t)(code.address)
     return function  # type: ignore[no-any-return]  # llvmlite is not typed
@@ -106,6 +107,8 @@ def clock_address() -> int:
 def _module() -> Any:
     """Return the function in LLVM's language."""
     from llvmlite import ir
+
+    from .machine_code import ENTRY
 
     word, narrow = ir.IntType(64), ir.IntType(32)
     module = ir.Module("aloft.chain")

@@ -10,12 +10,12 @@ from functools import partial
 from typing import Any
 
 from ...processes.child_process import ChildProcess, processors
-from ..kernel import kernels
 from . import shipped, store
 from .arguments import ArgumentType, pack, type_of
 from .failures import CompileError
 from .fingerprint import fingerprint
 from .kernel_call import KernelCall
+from .kernel_registry import kernels
 from .machine_code import MachineCode, optimised, tools
 from .sharing import CompileJob, divide, helpers
 
@@ -49,6 +49,13 @@ def compile_calls(calls: Sequence[KernelCall]) -> str:
         for call in calls:
             call.use_plain()
         return str(error) or type(error).__name__
+
+
+def run_compiled(kernel: Callable[..., None], *arguments: Any) -> None:
+    """Call a kernel once, as machine code where that can be."""
+    call = KernelCall(kernel, *arguments)
+    compile_calls([call])
+    call.run()
 
 
 class _Compilation:

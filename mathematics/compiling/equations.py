@@ -27,7 +27,6 @@ from types import CodeType
 from typing import Any
 
 from .carried_arrays import CarriedArrays
-from .expressions import EquationError as EquationError  # noqa: PLC0414  also imported from here
 from .expressions import cloned, indices_of, shown
 from .kernel_registry import is_kernel, reports_event, written_code
 from .kinds import NUMBER, ArrayKind, Kind, NumberKind, RecordKind, argument_kinds

@@ -18,8 +18,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .machine_code import ENTRY, machine_code_of
-
 MOST = 3
 """The largest number of arguments."""
 
@@ -83,11 +81,15 @@ def address_of(function: Any) -> int:
 def _caller(count: int) -> int:
     """Return the address of machine code that calls a function; the words at an address are those
     of the function and of its ``count`` arguments."""
+    from .machine_code import machine_code_of
+
     return machine_code_of(_caller_module, count).address
 
 
 def _caller_module(count: int) -> Any:
     from llvmlite import ir
+
+    from .machine_code import ENTRY
 
     word = ir.IntType(64)
     module = ir.Module(f"aloft.library.{count}")

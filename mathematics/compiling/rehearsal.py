@@ -17,7 +17,8 @@ import numpy as np
 from ..kernel import expand
 from .arguments import error_record, type_of
 from .compile_calls import compile_calls
-from .equations import EquationError, check_equations
+from .equations import check_equations
+from .expressions import EquationError
 from .failures import FAILURES
 from .fingerprint import numba_functions
 from .kernel_call import KernelCall

@@ -7,7 +7,7 @@ as the task says, with a step where the task has one. Everything is vectorised o
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,11 +17,17 @@ from numpy.typing import NDArray
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import Motors, RobotDescription
-from ...robots.kinematics import LinkPoses
 from ...robots.welding import welded
 from ..models.euler_angles import euler_angles
 from ..models.exact_dynamics import dynamics_of
-from ..models.link_shapes import arms, clearance_deficit, gaps_between, legs, moving_shapes
+from ..models.link_shapes import (
+    MovingShape,
+    arms,
+    clearance_deficit,
+    gaps_between,
+    legs,
+    moving_shapes,
+)
 from ..models.robot_model import model_of, stances_of
 from ..models.symmetry import mirrored_pairs, symmetrised
 from ..task.phase import Phase
@@ -45,16 +51,21 @@ def ground_height(
 ) -> Array:
     """Return the ground's height [m] at ``x``, ``y`` [m].
 
-    ``progress``, of the same shape, is how many flights are over, with the share of the present
+    ``progress``, of the same shape or the last axes of it, is how many flights are over, with the share of the present
     one's time: 1.5 in the middle of the second flight. Below 0 counts as 0, above all as all.
     """
     hops, places = task.hops(), task.places()
     if all(place.z == 0.0 and place.slope == LEVEL for place in places):
         return np.zeros(x.shape)
-    done = np.clip(np.broadcast_to(progress, x.shape), 0.0, len(hops))
-    levels = np.array([np.broadcast_to(place.height(x, y), x.shape) for place in places])
+    # What follows from the progress alone is worked out in its own shape, which is smaller than that of ``x``.
+    done = np.clip(progress, 0.0, len(hops))
     nearest = np.floor(done + 0.5).astype(np.int64)
-    found = np.take_along_axis(levels, nearest[np.newaxis], axis=0)[0]
+    if task.leans:
+        levels = np.array([np.broadcast_to(place.height(x, y), x.shape) for place in places])
+        found = np.take_along_axis(levels, np.broadcast_to(nearest, x.shape)[np.newaxis], axis=0)[0]
+    else:
+        levels = np.array([place.z for place in places])
+        found = levels[nearest]
     for number, hop in enumerate(hops):
         edge = edge_of(hop, places[number])
         if edge is None:
@@ -63,22 +74,25 @@ def ground_height(
         flying = (done > number) & (done < number + 1)
         found = np.where(beyond & (flying | (done == number)), levels[number + 1], found)
         found = np.where(~beyond & (flying | (done == number + 1)), levels[number], found)
-    return np.asarray(found)
+    return np.broadcast_to(found, x.shape)
+
+
+Shapes = Mapping[str, Sequence[MovingShape]]
+"""The shapes of every link, by its name; see ``moving_shapes``."""
 
 
 def body_heights(
-    robot: RobotDescription, task: JumpTask, poses: LinkPoses, progress: Array
+    robot: RobotDescription, task: JumpTask, shapes: Shapes, progress: Array
 ) -> dict[str, Array]:
     """Return by link, except for soles, the lowest height [m] of its shapes above the ground, (n,).
 
-    Balls along their edges stand for them, close enough that no edge of a step passes between two. Where
-    the ground has edges, a ball's height is that of its lower side above the ground right below it. What a foot
-    that is a ball covers of its leg does not count.
+    Balls at their corners stand for them. Where the ground has edges these are balls along the shapes' edges, close
+    enough that no edge of a step passes between two, and a ball's height is that of its lower side above the ground
+    right below it. What a foot that is a ball covers of its leg does not count.
     """
     feet = {foot.link for foot in robot.feet}
     ends = {robot.feet[ball.foot].link: ball for ball in ball_feet(robot) if ball.radius}
     uneven = task.leans or any(hop.landing_height or hop.gap for hop in task.hops())
-    shares = np.linspace(0.0, 1.0, BALLS if uneven else 2)[:, None, None]
     aside = np.linspace(-0.95, 0.95, 7)[:, None, None]
     found = {}
     for link in robot.links:
@@ -86,15 +100,11 @@ def body_heights(
         if (link.name in feet and ball is None) or not link.shapes:
             continue
         heights = []
-        shapes = moving_shapes(robot, poses, link.name)
-        for radius, (start, stop) in (
-            (each.shape.radius, edge) for each in shapes for edge in each.edges()
-        ):
-            centres = start + shares * (stop - start)
+        for each, centres in ((e, line) for e in shapes[link.name] for line in _balls(e, uneven)):
+            radius = each.shape.radius
             if ball is not None:
-                position, rotation = poses.of(link.name)
                 apart = np.linalg.norm(
-                    centres[:, 0] - position[0] - rotation[0] @ ball.centre, axis=1
+                    centres[:, 0] - each.position[0] - each.rotation[0] @ ball.centre, axis=1
                 )
                 centres = centres[apart > ball.radius + radius]
                 if not len(centres):
@@ -111,8 +121,18 @@ def body_heights(
     return found
 
 
+def _balls(shape: MovingShape, along: bool) -> list[Array]:
+    """Return the centres of the balls that stand for a shape: at its corners, or ``along`` each of its edges,
+    (n_balls, n, 3).
+    """
+    if not along:
+        return [shape.corners]
+    shares = np.linspace(0.0, 1.0, BALLS)[:, None, None]
+    return [start + shares * (stop - start) for start, stop in shape.edges()]
+
+
 def arm_clearance_deficit(
-    robot: RobotDescription, poses: LinkPoses, wanted: float
+    robot: RobotDescription, shapes: Shapes, wanted: float
 ) -> tuple[Array, str] | None:
     """Return the same as ``leg_clearance_deficit`` between each of the ``arms`` and all that is no part of it; and which link lacks
     most. ``None`` where no arm has shapes that could touch.
@@ -125,10 +145,9 @@ def arm_clearance_deficit(
             for other in robot.links:
                 if other.name in arm:
                     continue
-                own, others = (moving_shapes(robot, poses, name) for name in (link, other.name))
-                if not (own and others):
+                if not (shapes[link] and shapes[other.name]):
                     continue
-                near = gaps_between(own, others)
+                near = gaps_between(shapes[link], shapes[other.name])
                 found = clearance_deficit(near, wanted, 0, carried=other.name == parent[link])
                 lack = found if lack is None else np.maximum(lack, found)
                 if found.max() > most:
@@ -136,23 +155,20 @@ def arm_clearance_deficit(
     return None if lack is None else (lack, worst_link)
 
 
-def leg_clearance_deficit(robot: RobotDescription, poses: LinkPoses, wanted: float) -> Array | None:
+def leg_clearance_deficit(robot: RobotDescription, shapes: Shapes, wanted: float) -> Array | None:
     """Return the distance [m] by which the links of different legs are closer than ``wanted``, or than at the first
     instant where they stand closer than that, the worst at each instant (n,); ``None`` where no two legs have shapes.
     """
     lack: Array | None = None
-    for gap in _gaps(robot, poses):
+    for gap in _gaps(robot, shapes):
         found = clearance_deficit(gap, wanted, 0)
         lack = found if lack is None else np.maximum(lack, found)
     return lack
 
 
-def _gaps(robot: RobotDescription, poses: LinkPoses) -> Iterator[Array]:
+def _gaps(robot: RobotDescription, shapes: Shapes) -> Iterator[Array]:
     """Yield the distances (pairs, n) between all shapes of one leg and all of another."""
-    chains = [
-        [shape for link in chain for shape in moving_shapes(robot, poses, link)]
-        for chain in legs(robot)
-    ]
+    chains = [[shape for link in chain for shape in shapes[link]] for chain in legs(robot)]
     for number, chain in enumerate(chains):
         for other in chains[number + 1 :]:
             if chain and other:
@@ -230,22 +246,17 @@ class Evidence:
     def middles(self) -> NDArray[np.int64]:
         """The sample nearest to the middle of every interval that lasts."""
         time, samples = self.plan.time, self.replay.samples
-        lasting = np.flatnonzero(np.diff(time) > 0.0)
-        first = np.searchsorted(samples.knot, lasting)
-        behind = np.searchsorted(samples.knot, lasting, side="right")
-        middle = 0.5 * (time[lasting] + time[lasting + 1])
-        return np.array(
-            [
-                i + int(np.abs(samples.time[i:j] - m).argmin())
-                for i, j, m in zip(first.tolist(), behind.tolist(), middle.tolist(), strict=True)
-            ],
-            np.int64,
-        )
+        apart = np.abs(samples.time - (0.5 * (time[:-1] + time[1:]))[samples.knot])
+        first = np.searchsorted(samples.knot, np.arange(len(time) - 1))
+        nearest = np.flatnonzero(apart == np.minimum.reduceat(apart, first)[samples.knot])
+        found = nearest[np.searchsorted(nearest, first)]
+        return np.asarray(found[self.plan.lasting], np.int64)
 
     @cached_property
-    def poses(self) -> LinkPoses:
-        """The links at the samples."""
-        return dynamics_of(self.robot).link_poses(self.replay.samples.position)
+    def shapes(self) -> Shapes:
+        """The links' shapes at the samples."""
+        poses = dynamics_of(self.robot).link_poses(self.replay.samples.position)
+        return moving_shapes(self.robot, poses)
 
     @cached_property
     def progress(self) -> Array:
@@ -342,7 +353,7 @@ class Evidence:
 
     def figures(self) -> dict[str, float]:
         """Return the plan's performance and loads, by name with unit."""
-        r, lasting = self.replay, np.diff(self.plan.time) > 0.0
+        r, lasting = self.replay, self.plan.lasting
         force = self.plan.contact_force[:-1][lasting].sum(axis=1)[:, 2]
         k = r.flights[0][0]
         return {

@@ -204,11 +204,10 @@ def contacts(e: Evidence) -> Iterator[PlanTestResult]:
     loaded = plan.contact[s.knot]
     flying = plan.phase[s.knot] == Phase.FLIGHT
     standing = loaded & ~flying[:, None]
-    slip = np.zeros(len(names))
-    for place in range(len(plan.flights) + 1):
-        there = (standing & (e.place == place)[:, None])[:, :, None]
-        most, least = (np.where(there, e.resting, sign * np.inf) for sign in (-1.0, 1.0))
-        slip = np.maximum(slip, (most.max(axis=0) - least.min(axis=0)).max(axis=1))
+    begins, there = np.flatnonzero(np.diff(e.place, prepend=-1)), standing[:, :, None]
+    most = np.maximum.reduceat(np.where(there, e.resting, -np.inf), begins)
+    least = np.minimum.reduceat(np.where(there, e.resting, np.inf), begins)
+    slip = np.maximum((most - least).max(axis=(0, 2)), 0.0)
     yield PlanTestResult("foot_slip", slip.max(), 3 * MILLIMETRE, "m", "how far a loaded point moves",
                 names[int(slip.argmax())])  # fmt: skip
     height = np.where(standing, np.abs(e.point_height), 0.0)
@@ -366,7 +365,7 @@ def clearances(e: Evidence) -> Iterator[PlanTestResult]:
     yield PlanTestResult("foot_clearance", missing.max(), MILLIMETRE, "m",
                 "what the feet lack of the clearance asked for in the middle of the flight",
                 names[int(missing.argmax())])  # fmt: skip
-    heights = body_heights(robot, task, e.poses, e.progress)
+    heights = body_heights(robot, task, e.shapes, e.progress)
     if heights:
         link = min(heights, key=lambda name: float(heights[name].min()))
         sample = int(heights[link].argmin())
@@ -375,12 +374,12 @@ def clearances(e: Evidence) -> Iterator[PlanTestResult]:
     low = _fall_height(robot) - e.base_height
     yield PlanTestResult("base_height", float(low.max()), MILLIMETRE, "m",
                 "how far the base is below the height that counts as a fall", e.moment(int(low.argmax())))  # fmt: skip
-    deficit = leg_clearance_deficit(robot, e.poses, task.leg_clearance)
+    deficit = leg_clearance_deficit(robot, e.shapes, task.leg_clearance)
     if deficit is not None:  # else no two legs have shapes that could touch
         sample = int(deficit.argmax())
         yield PlanTestResult("leg_clearance", float(deficit[sample]), MILLIMETRE, "m",
                     "what the legs lack of the gap asked for", e.moment(sample))  # fmt: skip
-    swung = arm_clearance_deficit(robot, e.poses, task.leg_clearance) if task.moving else None
+    swung = arm_clearance_deficit(robot, e.shapes, task.leg_clearance) if task.moving else None
     if swung is not None:
         deficit, link = swung
         sample = int(deficit.argmax())
@@ -464,7 +463,7 @@ def _narrow(e: Evidence) -> Iterator[str]:
     at = [int(np.abs(e.progress - 0.5 - i).argmin()) for i in range(len(e.plan.flights))]
     if e.point_height[at].min() < task.foot_clearance + MILLIMETRE:
         yield "foot"
-    heights = body_heights(robot, task, e.poses, e.progress).values()
+    heights = body_heights(robot, task, e.shapes, e.progress).values()
     lowest = np.min(list(heights), axis=0) if heights else np.full(1, np.inf)
     for name, height, least in (
         ("ground", lowest, LEAST_GAP if gap is None else gap),
@@ -472,7 +471,7 @@ def _narrow(e: Evidence) -> Iterator[str]:
     ):
         if height.min() < least + MILLIMETRE < height[0]:
             yield name
-    deficit = leg_clearance_deficit(robot, e.poses, task.leg_clearance)
+    deficit = leg_clearance_deficit(robot, e.shapes, task.leg_clearance)
     if deficit is not None and deficit[0] < -MILLIMETRE < deficit.max():
         yield "leg"
 

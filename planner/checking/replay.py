@@ -7,7 +7,6 @@ also integrated as a whole, from lift-off to touchdown.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,10 +22,9 @@ from ..models.exact_dynamics import (
     Segments,
     dynamics_of,
     half_steps,
-    joint_motions,
     rotation_between,
+    states_between,
 )
-from ..task.phase import Phase
 from ..task.plan import PlannedJump
 
 FLIGHT_STEP = 0.002
@@ -88,8 +86,7 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
     Raises:
         ValueError: it has not one flight for every jump of its task.
     """
-    dynamics, flights = dynamics_of(robot), flight_knots(plan)
-    lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
+    dynamics, flights, lasting = dynamics_of(robot), plan.flight_knots, plan.lasting
     flown = [_flight(plan, lift_off, touchdown) for lift_off, touchdown in flights]
     single = half_steps(plan.position, plan.velocity, plan.time, plan.contact_force, lasting)
     places, rates = dynamics.follow(Segments.joined([*(one.segments for one in flown), single]))
@@ -105,12 +102,15 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
         k: dynamics.velocity_after_impact(
             plan.position[k], plan.velocity[k], plan.contact_force[k], held_joints(plan, k)
         )
-        for k in np.flatnonzero(np.diff(plan.time) <= 0.0).tolist()
+        for k in np.flatnonzero(plan.steps <= 0.0).tolist()
     }
     defect = _defects(plan, impacts, lasting, places[first + 1 :: 2], rates[first + 1 :: 2])
     gap, wrench = midpoint_residuals(plan, dynamics)
-    grounded = ~np.isin(lasting, np.concatenate([np.arange(*flight) for flight in flights]))
-    half = 0.5 * np.diff(plan.time)[lasting[grounded]]
+    flying = np.zeros(len(plan.steps), np.bool_)
+    for lift_off, touchdown in flights:
+        flying[lift_off:touchdown] = True
+    grounded = ~flying[lasting]
+    half = 0.5 * plan.steps[lasting[grounded]]
     samples, terms, knots = _sample(
         plan, dynamics,
         np.concatenate([*(one.time for one in flown), plan.time[lasting[grounded]] + half]),
@@ -130,27 +130,6 @@ def replay(plan: PlannedJump, robot: RobotDescription) -> Replay:
     )  # fmt: skip
 
 
-def flight_knots(plan: PlannedJump) -> tuple[tuple[int, int], ...]:
-    """Return the knots at lift-off and at touchdown of every flight, the latter before any impact.
-
-    Raises:
-        ValueError: there are more or fewer flights than jumps.
-    """
-    flying = np.flatnonzero((plan.phase[:-1] == Phase.FLIGHT) & (np.diff(plan.time) > 0.0))
-    found = [
-        (int(run[0]), int(run[-1]) + 1)
-        for run in np.split(flying, np.flatnonzero(np.diff(flying) > 1) + 1)
-        if len(run)
-    ]
-    jumps = len(plan.task.hops())
-    if len(found) != jumps:
-        raise ValueError(
-            f"a plan has a flight, of intervals one after the other, for every jump; found "
-            f"{len(found)} for {jumps}"
-        )
-    return tuple(found)
-
-
 @dataclass(frozen=True)
 class _Flight:
     """A whole flight: time and interval of the end of every step, (n_steps,)."""
@@ -162,26 +141,31 @@ class _Flight:
 
 def _flight(plan: PlannedJump, lift_off: int, touchdown: int) -> _Flight:
     """Return the flight from the plan's state at lift-off, in steps of at most ``FLIGHT_STEP``."""
-    passed: list[Array] = [np.zeros(1)]
-    steps, times, knots = list[Array](), list[Array](), list[int]()
-    for k in range(lift_off, touchdown):
-        duration = float(plan.time[k + 1] - plan.time[k])
-        # An even number of steps, so that the interval's middle is among them.
-        count = 2 * math.ceil(0.5 * duration / FLIGHT_STEP)
-        step = duration / count
-        passed.append(np.asarray(0.5 * step * np.arange(1, 2 * count + 1), dtype=np.float64))
-        steps.append(np.full(count, step))
-        times.append(plan.time[k] + step * np.arange(1, count + 1))
-        knots += [k] * count
-    of_halves = np.concatenate([[lift_off], np.repeat(knots, 2)])
-    joints = joint_motions(plan.position, plan.velocity, plan.time, of_halves)
-    angles, speeds, _ = joints.at(np.concatenate(passed)[:, None])
+    # An even number of steps, so that the interval's middle is among them.
+    durations = plan.steps[lift_off:touchdown]
+    counts = 2 * np.ceil(0.5 * durations / FLIGHT_STEP).astype(np.int64)
+    step = durations / counts
+    interval, number = _numbered(counts)
+    half, half_number = _numbered(2 * counts)
+    passed = np.concatenate([[0.0], 0.5 * step[half] * half_number])
+    angles, speeds, _ = states_between(
+        plan.position[:, 7:], plan.velocity[:, 6:], plan.time,
+        lift_off + np.concatenate([[0], half]), passed,
+    )  # fmt: skip
     first = slice(lift_off, lift_off + 1)
     segments = Segments(
         plan.position[first, :7], plan.velocity[first, :6], angles, speeds,
-        np.zeros_like(plan.contact_force[first]), np.concatenate(steps), np.array([len(knots)]),
+        np.zeros_like(plan.contact_force[first]), step[interval], np.array([len(interval)]),
     )  # fmt: skip
-    return _Flight(segments, np.concatenate(times), np.array(knots))
+    return _Flight(
+        segments, plan.time[lift_off + interval] + step[interval] * number, lift_off + interval
+    )
+
+
+def _numbered(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return, where the k-th of some things has so many parts, of every part the thing and its number in it, from 1."""
+    of_part = np.repeat(np.arange(len(counts)), counts)
+    return of_part, np.arange(1, len(of_part) + 1) - (np.cumsum(counts) - counts)[of_part]
 
 
 def held_joints(plan: PlannedJump, k: int) -> NDArray[np.bool_]:
@@ -229,10 +213,10 @@ def _sample(
     instant = np.concatenate([plan.time, time])[order]
     position = np.concatenate([plan.position, places])[order]
     velocity = np.concatenate([plan.velocity, rates])[order]
-    joints = joint_motions(plan.position, plan.velocity, plan.time, interval)
-    lasts = np.asarray(joints.duration > 0.0)
-    joints = joints._replace(duration=np.where(lasts, joints.duration, 1.0))
-    bend = joints.at((instant - plan.time[interval])[:, None])[2]
+    _, _, bend = states_between(
+        plan.position[:, 7:], plan.velocity[:, 6:], plan.time, interval, instant - plan.time[interval]
+    )  # fmt: skip
+    lasts = (plan.time[interval + 1] > plan.time[interval])[:, None]
     force = np.where(lasts[:, :, None], plan.contact_force[interval], 0.0)
     terms = dynamics.motion(position, velocity, bend, force)
     contacts = force.shape[1]
@@ -254,8 +238,8 @@ def midpoint_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> tuple[Arra
     """
     places, rates = coordinates_of(plan.position, plan.velocity)
     gap, wrench = np.zeros(len(plan.time) - 1), np.zeros(len(plan.time) - 1)
-    k = np.flatnonzero(np.diff(plan.time) > 0.0)
-    h = np.diff(plan.time)[k][:, None]
+    k = plan.lasting
+    h = plan.steps[k][:, None]
     bend = (rates[k + 1] - rates[k]) / h
     gap[k] = np.abs(places[k + 1] - places[k] - 0.5 * h * (rates[k] + rates[k + 1])).max(axis=1)
     middle = places[k] + 0.5 * h * rates[k] + 0.125 * h * h * bend

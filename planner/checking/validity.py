@@ -14,21 +14,11 @@ from typing import Any
 import numpy as np
 
 from ...robots.description import RobotDescription
-from ...runtime.language.errors import AloftError
 from ..task.files import JumpTaskError
-from ..task.plan import ARRAYS, PlannedJump
+from ..task.plan import ARRAYS, InvalidPlanError, PlannedJump
 from .evidence import Evidence
 from .plan_tests import PLAN_TESTS
 from .replay import replay
-
-
-class InvalidPlanError(AloftError):
-    """A plan failed the validity check; the message names the tests that failed. ``plan`` is that
-    plan with its report, to look at and not to run."""
-
-    def __init__(self, message: str, plan: PlannedJump) -> None:
-        super().__init__(message)
-        self.plan = plan
 
 
 @dataclass(frozen=True)

@@ -261,9 +261,9 @@ def _interval_ends(plan: PlannedJump) -> tuple[Array, NDArray[np.int64]]:
 
     Lines of what is constant over each interval have these points.
     """
-    lasting = np.diff(plan.time) > 0.0
+    lasting = plan.lasting
     time = np.repeat(plan.time, 2)[1:-1].reshape(-1, 2)[lasting].ravel()
-    return time, np.repeat(np.flatnonzero(lasting), 2)
+    return time, np.repeat(lasting, 2)
 
 
 def _torque_share(e: Evidence) -> Array:

@@ -6,7 +6,6 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from ...files.cache import cache_root, trusted_file
 from ...robots.description import RobotDescription
 from ..task.files import PlanError
 from ..task.plan import (
+    InvalidPlanError,
     PlanFileError,
     PlannedJump,
     motor_load,
@@ -28,7 +28,7 @@ from ..task.task import JumpTask, JumpTaskError
 
 def shipped_folder() -> Path:
     """Return the folder of the graphs that ship with aloft, with their ``tasks`` and ``plans``."""
-    return Path(str(files(__package__.partition(".planner")[0]) / "graphs"))
+    return Path(__file__).parents[2] / "graphs"
 
 
 def find_task(name: str, *folders: Path) -> Path:
@@ -176,7 +176,7 @@ class PlanLibrary:
         Raises:
             JumpTaskError, PlanFileError, PlanError: as ``plan``.
         """
-        from ..checking.validity import InvalidPlanError, checked  # a graph is checked without it
+        from ..checking.validity import checked  # a graph is checked and run without it
 
         invalid = PlanLibrary(self.robot, self.folder / INVALID, ())
         found = self.find(task) or invalid.find(task)
@@ -342,7 +342,6 @@ class PlanLibrary:
             PlanError: the task cannot be planned.
             InvalidPlanError: it can, but the plan fails the validity check; it is not kept.
         """
-        from ..checking.validity import InvalidPlanError
         from .validation_cache import require_valid_cached
 
         kept = None if anew else self.find(task)

@@ -14,10 +14,9 @@ from dataclasses import dataclass, field
 
 from ...robots.description import RobotDescription
 from ..checking.plan_tests import active_limits
-from ..checking.validity import InvalidPlanError
 from ..solving.solver_process import cpu_time
 from ..task.files import JumpTaskError, PlanError
-from ..task.plan import PlannedJump
+from ..task.plan import InvalidPlanError, PlannedJump
 from ..task.task import JumpTask
 from .library import SCALES, PlanLibrary, Solver, solve_and_check
 

@@ -22,23 +22,20 @@ from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...mathematics.rotations import matrices_of_quaternions
 from ...robots.description import RobotDescription
-from ..checking.replay import flight_knots
 from ..models.euler_angles import (
-    angular_motion,
-    euler_angles,
-    euler_rates,
+    ORDER,
+    coordinates_of,
     rotation,
     times,
-    times_transposed,
+    twist_of,
     unwrapped,
 )
 from ..models.exact_dynamics import (
     AFTER,
     BEFORE,
     ExactDynamics,
-    JointMotion,
     dynamics_of,
-    joint_motions,
+    states_between,
 )
 from ..task.phase import Phase
 from ..task.plan import PlannedJump
@@ -83,14 +80,16 @@ def reference_table(
             )
     for name in ("com_acceleration", "angular_momentum_rate"):
         columns[name][-1] = 0.0  # the plan has come to rest, and the last row stays
-    standing = {name: values[:1] for name, values in columns.items()}
+    # The table begins at rest in the first state, with two rows.
+    rows = np.concatenate([[0, 0], np.arange(len(instants))])
+    columns = {name: values[rows] for name, values in columns.items()}
     for name in (
         "com_acceleration",
         "angular_acceleration",
         "angular_momentum_rate",
         "joint_acceleration",
     ):
-        standing[name] = np.zeros_like(standing[name])
+        columns[name][:2] = 0.0
     start = {
         phase: stand_time + float(plan.time[plan.phase == phase][0])
         for phase in (Phase.SQUAT, Phase.THRUST, Phase.RECOVER)
@@ -99,7 +98,7 @@ def reference_table(
     end = stand_time + float(plan.time[-1])
     return JumpTable(
         np.concatenate([[0.0, stand_time], stand_time + instants]),
-        {n: np.concatenate([standing[n], standing[n], c]) for n, c in columns.items()},
+        columns,
         stand_time,
         start.get(Phase.THRUST, start.get(Phase.SQUAT, stand_time)),
         stand_time + plan.lift_off_time,
@@ -142,7 +141,7 @@ class _States(NamedTuple):
 def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, float]) -> _States:
     """Return the motion, knots and what lies between them; two rows at an impact."""
     last = len(plan.time) - 1
-    lengths = np.diff(plan.time)
+    lengths = plan.steps
     longest = [steps.get(Phase(phase), STEP) for phase in plan.phase[:-1].tolist()]
     counts = np.maximum(np.ceil(lengths / longest - 1e-9), 1.0).astype(np.int64)
     knot = np.repeat(np.arange(last), counts)
@@ -152,7 +151,7 @@ def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, fl
     position, velocity = plan.position[knot], plan.velocity[knot]
     bend = plan.acceleration[knot, 3:]
     position[between], velocity[between], bend[between] = _between(
-        plan, dynamics, knot[between], passed[between, None]
+        plan, dynamics, knot[between], passed[between]
     )
     still = np.zeros((1, plan.velocity.shape[1] - 3))
     return _States(
@@ -167,27 +166,18 @@ def _states(plan: PlannedJump, dynamics: ExactDynamics, steps: Mapping[Phase, fl
 def _between(
     plan: PlannedJump, dynamics: ExactDynamics, knot: NDArray[np.int64], passed: Array
 ) -> tuple[Array, Array, Array]:
-    """Return Pinocchio's q and v at those times (n, 1) since knots, and the accelerations of ``_States``: the cubics of
+    """Return Pinocchio's q and v at those times since knots, both (n,), and the accelerations of ``_States``: the cubics of
     base position, Euler angles and joints between two knots.
     """
-    angles = euler_angles(plan.position[:, 3:7])
-    turns = matrices_of_quaternions(plan.position[:, 3:7])
-    places = np.hstack([plan.position[:, :3], angles])
-    rates = np.hstack(
-        [times(turns, plan.velocity[:, :3]), euler_rates(angles, plan.velocity[:, 3:6])]
-    )
-    length = (plan.time[knot + 1] - plan.time[knot])[:, None]
-    base = JointMotion(places[knot], places[knot + 1], rates[knot], rates[knot + 1], length)
-    place, rate, bend = base.at(passed)
-    joints = joint_motions(plan.position, plan.velocity, plan.time, knot).at(passed)
-    turn = rotation(place[:, 3:])
-    spin, bent = angular_motion(place[:, 3:], rate[:, 3:], bend[:, 3:])
-    quaternions = pinocchio_quaternions(dynamics.pin, turn)
+    q, v = coordinates_of(plan.position, plan.velocity)
+    # The plan's own matrices: a matrix of the angles has other last bits.
+    v[:, :3] = times(matrices_of_quaternions(plan.position[:, 3:7]), plan.velocity[:, :3])
+    place, rate, bend = states_between(q, v, plan.time, knot, passed)
+    velocity, acceleration = twist_of(place, rate, bend)
+    quaternions = pinocchio_quaternions(dynamics.pin, rotation(place[:, 3:6][:, ORDER]))
     return (
-        np.hstack([place[:, :3], quaternions, joints[0]]),
-        np.hstack([times_transposed(turn, rate[:, :3]), spin, joints[1]]),
-        np.hstack([bent, joints[2]]),
-    )
+        np.hstack([place[:, :3], quaternions, place[:, 6:]]), velocity, acceleration[:, 3:],
+    )  # fmt: skip
 
 
 def pinocchio_quaternions(pin: Any, turns: Array) -> Array:
@@ -212,21 +202,21 @@ def _middle_values(
     """Return what the intervals' values (n_knots, m) are at instants in those intervals: linear from one middle to the
     next, never across lift-off or touchdown.
     """
-    lasting = np.flatnonzero(np.diff(plan.time) > 0.0)
-    ends = np.array([knot for flight in flight_knots(plan) for knot in flight])
-    found = np.empty((len(instants), values.shape[1]))
+    lasting = plan.lasting
+    ends = np.array([knot for flight in plan.flight_knots for knot in flight])
+    middles = 0.5 * (plan.time[lasting] + plan.time[lasting + 1])
+    # Each instant lies between two middles of its own group: what is before, between or behind those ends.
+    bounds = np.concatenate([[0], np.searchsorted(lasting, ends), [len(lasting)]])
     number = np.searchsorted(ends, intervals, side="right")
-    for k, group in enumerate(np.split(lasting, np.searchsorted(lasting, ends))):
-        here = np.flatnonzero(number == k)
-        middles = 0.5 * (plan.time[group] + plan.time[group + 1])
-        after = np.searchsorted(middles, instants[here])
-        outside = (after == 0) | (after == len(middles))
-        found[here] = values[group[np.minimum(after, len(middles) - 1)]]
-        here, after = here[~outside], after[~outside]
-        share = (instants[here] - middles[after - 1]) / (middles[after] - middles[after - 1])
-        first, second = values[group[after - 1]], values[group[after]]
-        found[here] = first + share[:, None] * (second - first)
-    return found
+    first, stop = bounds[number], bounds[number + 1]
+    after = np.clip(np.searchsorted(middles, instants), first, stop)
+    found = values[lasting[np.minimum(after, stop - 1)]]
+    inside = np.flatnonzero((after > first) & (after < stop))
+    after = after[inside]
+    share = (instants[inside] - middles[after - 1]) / (middles[after] - middles[after - 1])
+    before = values[lasting[after - 1]]
+    found[inside] = before + share[:, None] * (values[lasting[after]] - before)
+    return np.asarray(found)
 
 
 def _rows(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str, Array]:
@@ -239,15 +229,15 @@ def _rows(dynamics: ExactDynamics, q: Array, v: Array, force: Array) -> dict[str
         "com_velocity": feet.com_velocity,
         "com_acceleration": force.sum(axis=1) / dynamics.mass + np.array([0.0, 0.0, -GRAVITY]),
         "orientation": q[:, 3:7].copy(),
-        "angular_velocity": v[:, 3:6].copy(),
+        "angular_velocity": v[:, 3:6],
         "angular_momentum": feet.momentum,
         "angular_momentum_rate": moments.sum(axis=1),
         "foot_position": feet.soles,
         "foot_velocity": feet.sole_velocity,
         "foot_yaw": feet.yaw,
         "foot_pitch": feet.pitch,
-        "joint_position": q[:, 7:].copy(),
-        "joint_velocity": v[:, 6:].copy(),
+        "joint_position": q[:, 7:],
+        "joint_velocity": v[:, 6:],
     }
 
 

@@ -19,12 +19,10 @@ from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 
 from ...files.cache import Cache
-from ...mathematics.kept_arrays import code_digest, kept_arrays
+from ...mathematics.kept_arrays import Arrays, code_digest, kept_arrays
 from ...robots.robot_description import RobotDescription
-from ..checking.validity import require_valid
 from ..task.plan import ARRAYS, PlannedJump
 from .jump_table import JumpTable
-from .reference_table import reference_table
 
 FOLDERS = ("planner/checking", "planner/models", "planner/task", "robots", "mathematics")
 """The code that decides what the check finds."""
@@ -101,7 +99,13 @@ def require_valid_cached(plan: PlannedJump, robot: RobotDescription) -> None:
         InvalidPlanError: the plan is not valid.
     """
     key = content(plan, robot)
-    _valid.get(key, lambda: check_unless_noted(key, lambda: require_valid(plan, robot)))
+
+    def check() -> None:
+        from ..checking.validity import require_valid  # which a plan that has passed does without
+
+        require_valid(plan, robot)
+
+    _valid.get(key, lambda: check_unless_noted(key, check))
 
 
 def cached_reference_table(
@@ -110,11 +114,13 @@ def cached_reference_table(
     """Return the table of ``reference_table``, which is made once. It is not to be written to."""
     key = content(plan, robot), stand_time
 
+    def compute() -> Arrays:
+        from .reference_table import reference_table
+
+        return reference_table(plan, robot, stand_time).as_arrays()
+
     def make() -> JumpTable:
         decided_by = key[0] + repr(stand_time).encode() + code_digest(*TABLE_FOLDERS)
-        arrays = kept_arrays(
-            decided_by, lambda: reference_table(plan, robot, stand_time).as_arrays()
-        )
-        return JumpTable.from_arrays(arrays)
+        return JumpTable.from_arrays(kept_arrays(decided_by, compute))
 
     return _tables.get(key, make)

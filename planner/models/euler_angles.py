@@ -6,10 +6,14 @@ position, pitch, roll, yaw and joints: ``ORDER`` leads from one order of the ang
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...mathematics.rotations import cross_products, matrices_of_quaternions
+from ...mathematics.compiling.kernel_on_rows import KernelOnRows
+from ...mathematics.euler_motion import motions_in_body, motions_in_world
+from ...mathematics.rotations import matrices_of_quaternions
 
 ORDER = [1, 0, 2]
 """The planner's pitch, roll, yaw from angles about x, y, z, and back."""
@@ -41,14 +45,6 @@ def unwrapped(angles: Array) -> Array:
     return found
 
 
-def euler_rates(angles: Array, angular_velocity: Array) -> Array:
-    """Return the rates [rad/s] of the angles (..., 3) at a body-frame angular velocity (..., 3)."""
-    (x, _, z), (p, q, r) = _parts(angles), _parts(angular_velocity)
-    # Undone: angular velocity = Rz' (x rate, y rate cos x, -y rate sin x) + (0, 0, z rate).
-    about_y = (np.sin(z) * p + np.cos(z) * q) / np.cos(x)
-    return np.stack([np.cos(z) * p - np.sin(z) * q, about_y, r + about_y * np.sin(x)], axis=-1)
-
-
 def rotation(angles: Array) -> Array:
     """Return Ry Rx Rz, from body to world, (..., 3, 3)."""
     (cx, cy, cz), (sx, sy, sz) = _parts(np.cos(angles)), _parts(np.sin(angles))
@@ -61,23 +57,6 @@ def rotation(angles: Array) -> Array:
     found[..., 0, 2], found[..., 1, 2], found[..., 2, 2] = sy * cx, -sx, cy * cx
     found += 0.0  # as in a product of matrices, no zero has a sign
     return found
-
-
-def angular_motion(angles: Array, rates: Array, accelerations: Array) -> tuple[Array, Array]:
-    """Return the angular velocity [rad/s] and acceleration [rad/s^2] in the body frame, all (..., 3)."""
-    x, _, z = _parts(angles)
-    (p, q, r), (a, b, c) = _parts(rates), _parts(accelerations)
-    sine, cosine = np.sin(x), np.cos(x)
-
-    def back(u: Array, v: Array, w: Array) -> Array:
-        """Return Rz' of a vector."""
-        return np.stack([np.cos(z) * u + np.sin(z) * v, -np.sin(z) * u + np.cos(z) * v, w], axis=-1)
-
-    turning = back(p, q * cosine, -q * sine)
-    bend = back(a, b * cosine - p * q * sine, -b * sine - p * q * cosine)
-    about_z, more = np.zeros_like(turning), np.zeros_like(turning)
-    about_z[..., 2], more[..., 2] = r, c
-    return turning + about_z, bend - cross_products(about_z, turning) + more
 
 
 def _parts(vectors: Array) -> tuple[Array, Array, Array]:
@@ -112,23 +91,43 @@ def twist_of(q: Array, v: Array, bend: Array) -> tuple[Array, Array]:
     """Return the robot's velocities and accelerations, with the base's part in the body frame, of the planner's
     coordinates, their rates and accelerations, all (..., n_velocities).
     """
-    angles = q[..., 3:6][..., ORDER]
-    spin, turn = angular_motion(angles, v[..., 3:6][..., ORDER], bend[..., 3:6][..., ORDER])
-    to_world = rotation(angles)
-    speed = times_transposed(to_world, v[..., :3])
-    pull = times_transposed(to_world, bend[..., :3]) - cross_products(spin, speed)
-    return (
-        np.concatenate([speed, spin, v[..., 6:]], axis=-1),
-        np.concatenate([pull, turn, bend[..., 6:]], axis=-1),
-    )
+    size = v.shape[-1]
+    angles = q.reshape(-1, size)[:, 3:6]
+    call = _in_body(size)
+    sine, cosine, rate, change, _, velocity, acceleration = call.rows(len(angles))
+    np.sin(angles, out=sine)
+    np.cos(angles, out=cosine)
+    rate[:], change[:] = v.reshape(-1, size), bend.reshape(-1, size)
+    call.run()
+    return velocity.reshape(v.shape).copy(), acceleration.reshape(v.shape).copy()
+
+
+@cache
+def _in_body(size: int) -> KernelOnRows:
+    """Return the call of ``motions_in_body`` for so many coordinates."""
+    return KernelOnRows(
+        motions_in_body,
+        lambda n: (*np.zeros((2, n, 3)), *np.zeros((2, n, size)), np.zeros((3, 3)), *np.zeros((2, n, size))),
+    )  # fmt: skip
 
 
 def coordinates_of(position: Array, velocity: Array) -> tuple[Array, Array]:
     """Return the planner's coordinates and their rates, both (n, n_velocities), of a motion: ``position`` (n,
     n_positions) and ``velocity`` (n, n_velocities) as ``pose_of`` and ``twist_of`` give them.
     """
-    angles = euler_angles(position[:, 3:7])
-    places = np.hstack([position[:, :3], angles[:, ORDER], position[:, 7:]])
-    moved = times(rotation(angles), velocity[:, :3])
-    turned = euler_rates(angles, velocity[:, 3:6])[:, ORDER]
-    return places, np.hstack([moved, turned, velocity[:, 6:]])
+    angles, call = euler_angles(position[:, 3:7])[:, ORDER], _in_world(velocity.shape[1])
+    sine, cosine, given, _, rates = call.rows(len(angles))
+    np.sin(angles, out=sine)
+    np.cos(angles, out=cosine)
+    given[:] = velocity
+    call.run()
+    return np.hstack([position[:, :3], angles, position[:, 7:]]), rates.copy()
+
+
+@cache
+def _in_world(size: int) -> KernelOnRows:
+    """Return the call of ``motions_in_world`` for so many coordinates."""
+    return KernelOnRows(
+        motions_in_world,
+        lambda n: (*np.zeros((2, n, 3)), np.zeros((n, size)), np.zeros((3, 3)), np.zeros((n, size))),
+    )  # fmt: skip

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,20 +17,27 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array
-from ...mathematics.compiling.compile_calls import compile_calls
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.body_dynamics import body_motion
+from ...mathematics.compiling.kernel_on_rows import KernelOnRows
 from ...mathematics.constants import GRAVITY
+from ...mathematics.interpolation import cubic_motion
+from ...mathematics.pushed_motion import (
+    PushedTurns,
+    SeenMotion,
+    Stretches,
+    follow_stretches,
+    see_motion,
+    turn_memory,
+)
 from ...mathematics.rotations import cross_products, matrices_of_quaternions, skew
 from ...mathematics.whole_body_motion import (
     FixedPoints,
     GivenMotion,
     MotionTerms,
-    PushedTurns,
     evaluate_motion,
-    follow_turns,
     motion_memory,
     set_poses_at_instants,
-    turn_memory,
+    velocities_at_points,
 )
 from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses, ball_feet, body_tree
@@ -39,38 +47,10 @@ from .euler_angles import times, times_transposed
 
 WHOLE = [[0, 3, 4], [3, 1, 5], [4, 5, 2]]
 """Places of the parts xx, yy, zz, xy, xz, yz of an inertia in its matrix."""
-KEPT_CALLS = 32
-"""Calls whose memory is kept: as many numbers of instants."""
 Motion = tuple[Array, Array, Array]
-"""Joint angles, velocities and accelerations."""
+"""Places, rates and the rates' changes."""
 AFTER, BEFORE = [1, 2, 0], [2, 0, 1]
 """The axes after and before each one: for cross products, which NumPy's own makes slowly."""
-
-
-class JointMotion(NamedTuple):
-    """The joints between two knots: the cubics through both ends' angles and velocities. Between many
-    pairs of knots at once all of it has a row for each, the durations (n, 1).
-
-    Where the plan's joint acceleration is constant over the interval this is exactly its motion.
-    """
-
-    start: Array
-    end: Array
-    start_velocity: Array
-    end_velocity: Array
-    duration: float | Array
-
-    def at(self, time: float | Array) -> Motion:
-        """Return the angles, velocities and accelerations [rad] at ``time`` since the first knot [s]; at n times (n, 1)
-        each is (n, n_joints).
-        """
-        t, u = self.duration, time / self.duration
-        way = self.end - self.start
-        bend = 3.0 * way - t * (2.0 * self.start_velocity + self.end_velocity)
-        twist = t * (self.start_velocity + self.end_velocity) - 2.0 * way
-        position = self.start + u * (t * self.start_velocity + u * (bend + u * twist))
-        velocity = self.start_velocity + u / t * (2.0 * bend + 3.0 * u * twist)
-        return position, velocity, (2.0 * bend + 6.0 * u * twist) / (t * t)
 
 
 class Segments(NamedTuple):
@@ -131,13 +111,20 @@ class ExactDynamics:
         self.mass = robot.total_mass
         self._rotor_coupling = built.rotor_coupling
         self._rotors = robot.rotor_matrix
-        self._tree, self._memory = body_tree(robot), motion_memory(len(robot.joints))
+        self._tree = body_tree(robot)
         self._fixed = self._fixed_points(robot)
-        self._centres = self._fixed._replace(below=np.zeros_like(self._fixed.below))
-        self._calls: dict[object, tuple[KernelCall, GivenMotion, MotionTerms]] = {}
+        self._motions: dict[int, KernelOnRows] = {}
+        self._poses = KernelOnRows(set_poses_at_instants, self._of_poses)
+        self._seen = KernelOnRows(see_motion, self._of_seen)
+        self._stretches = KernelOnRows(
+            follow_stretches, partial(_of_stretches, len(robot.contacts))
+        )
+        self._speeds = KernelOnRows(velocities_at_points, self._of_speeds)
         self._links = (robot.base, *(joint.child for joint in robot.joints))
         self._columns = [self._moving(frame) for frame in built.contact_frames]
-        self._foot_columns = [self._moving(frame) for frame in built.sole_frames]
+        self._foot_moves = np.zeros((len(built.sole_frames), self.model.nv), np.bool_)
+        for moves, frame in zip(self._foot_moves, built.sole_frames, strict=True):
+            moves[self._moving(frame)] = True
 
     def _fixed_points(self, robot: RobotDescription) -> FixedPoints:
         """Return the contact points and behind them the sole centres. Of balls both are the lowest point."""
@@ -224,36 +211,29 @@ class ExactDynamics:
     def feet(self, position: Array, velocity: Array) -> FeetStates:
         """Return what a reference of the controller holds of n states."""
         pin, model, data = self.pin, self.model, self.data
-        count, feet = len(position), len(self.sole_frames)
+        count = len(position)
+        columns, _, places, speeds, _, rates = self._speeds.rows(count)
         # What Pinocchio computes is written in memory that stays. There the frames follow each other, each with the
-        # columns of its rotation and its place.
+        # columns of its rotation and its place, and the linear momentum and the angular one.
         first, second = (data.oMf[k].rotation.T for k in range(2))
         apart = second.ctypes.data - first.ctypes.data
-        read = (
-            data.com[0], data.hg.linear, data.hg.angular, data.oMi[1].rotation[:, 0], data.J,
-            as_strided(first, (len(data.oMf), 4, 3), (apart, 24, 8), writeable=False),
-        )  # fmt: skip
-        found = [np.empty((count, *each.shape)) for each in read]
+        place, momentum = data.com[0], as_strided(data.hg.linear, (6,), (8,), writeable=False)
+        jacobian = data.J.T
+        placed = as_strided(first, (len(data.oMf), 4, 3), (apart, 24, 8), writeable=False)
+        com, spatial = np.empty((count, 3)), np.empty((count, 6))
+        frames = np.empty((count, *placed.shape))
         for i, (q, v) in enumerate(zip(position, velocity, strict=True)):
             pin.computeCentroidalMomentum(model, data, q, v)
             pin.computeJointJacobians(model, data)
             pin.updateFramePlacements(model, data)
-            for each, now in zip(found, read, strict=True):
-                each[i] = now
-        com, linear, angular, base, columns, frames = found
+            com[i], spatial[i], columns[i], frames[i] = place, momentum, jacobian, placed
         contacts, soles = frames[:, self.contact_frames], frames[:, self.sole_frames]
-        points, places, up = contacts[:, :, 3], soles[:, :, 3], soles[:, :, 2]
-        yaw, pitch = self._angles(soles[:, :, 0], base)
-        rates = np.empty((count, feet, 6))
-        for foot, moving in enumerate(self._foot_columns):
-            # Of the columns seen from the world's origin those at the sole.
-            jacobian = np.zeros(columns.shape)
-            own = columns[:, :, moving]
-            jacobian[:, 3:, moving] = own[:, 3:]
-            arm = places[:, foot, :, None]
-            lever = arm[:, AFTER] * own[:, [5, 3, 4]] - arm[:, BEFORE] * own[:, [4, 5, 3]]
-            jacobian[:, :3, moving] = own[:, :3] - lever
-            rates[:, foot] = np.add.reduce(jacobian * velocity[:, None, :], axis=-1)
+        points, up = contacts[:, :, 3], soles[:, :, 2]
+        places[:], speeds[:] = soles[:, :, 3], velocity
+        # The base's own first axis is the linear part of the column that it moves along.
+        yaw, pitch = self._angles(soles[:, :, 0], columns[:, 0, :3])
+        self._speeds.run()
+        places, rates = places.copy(), rates.copy()
         for ball in self.balls:
             points[:, ball.point] += ball.radius * (
                 contacts[:, ball.point, 2] - np.array([0.0, 0.0, 1.0])
@@ -263,8 +243,23 @@ class ExactDynamics:
             turn = rates[:, ball.foot, 3:]
             rates[:, ball.foot, :3] += ball.radius * cross_products(turn, up[:, ball.foot])
         return FeetStates(
-            com, linear / self.mass, angular, points, places, rates[:, :, :3], yaw, pitch
+            com,
+            spatial[:, :3] / self.mass,
+            spatial[:, 3:],
+            points,
+            places,
+            rates[:, :, :3],
+            yaw,
+            pitch,
         )
+
+    def _of_speeds(self, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``velocities_at_points`` for the sole centres."""
+        feet, size = self._foot_moves.shape
+        return (
+            np.zeros((count, size, 6)), self._foot_moves, np.zeros((count, feet, 3)),
+            np.zeros((count, size)), np.zeros((6, size)), np.zeros((count, feet, 6)),
+        )  # fmt: skip
 
     def foot_angles(self) -> tuple[Array, Array]:
         """Return the heading and pitch of the feet [rad], both (n_feet,), in the state that was evaluated last. A ball
@@ -321,30 +316,11 @@ class ExactDynamics:
         The torques are those of the joints with their rotors, without friction. The points are the contact
         points and behind them the sole centres.
         """
-        return self._evaluate(self._fixed, position, velocity, bend, force)
-
-    def link_poses(self, position: Array) -> LinkPoses:
-        """Return the poses of the links in n states (n, n_positions), the base first."""
-        place = np.zeros((len(position), len(self._links), 3))
-        rotation = np.zeros((*place.shape[:2], 9))
-        run_compiled(
-            KernelCall(
-                set_poses_at_instants, self._tree, np.ascontiguousarray(position), self._memory.motion, place, rotation,
-            )
-        )  # fmt: skip
-        return LinkPoses(self._links, place, rotation.reshape(*place.shape, 3))
-
-    def _evaluate(
-        self, fixed: FixedPoints, position: Array, velocity: Array, bend: Array | None, force: Array | None
-    ) -> MotionTerms:  # fmt: skip
-        count, joints = len(position), len(self._rotors)
-        pushes = (count, 0, 3) if force is None else force.shape
-        key = fixed is self._fixed, pushes
-        if key not in self._calls:
-            if len(self._calls) >= KEPT_CALLS:
-                self._calls.clear()
-            self._calls[key] = self._evaluation(fixed, joints, pushes)
-        call, given, terms = self._calls[key]
+        pushed = 0 if force is None else force.shape[1]
+        if pushed not in self._motions:
+            self._motions[pushed] = KernelOnRows(evaluate_motion, partial(self._of_motion, pushed))
+        call = self._motions[pushed]
+        _, _, given, _, terms = call.rows(len(position))
         given.position[:], given.velocity[:] = position, velocity
         given.bend[:] = 0.0 if bend is None else bend
         if force is not None:
@@ -354,42 +330,58 @@ class ExactDynamics:
         found.torque[:] += given.bend @ self._rotors.T
         return found
 
-    def _evaluation(
-        self, fixed: FixedPoints, joints: int, pushes: tuple[int, ...]
-    ) -> tuple[KernelCall, GivenMotion, MotionTerms]:
-        """Return the call for so many instants, with its memory: to make a call takes longer than to run it."""
-        count, points = pushes[0], (len(fixed.body), 3)
+    def _of_motion(self, pushed: int, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``evaluate_motion`` with forces on so many points."""
+        joints, points = len(self._rotors), (len(self._fixed.body), 3)
         shapes = (
             (count, 3), (count, 3), (count, 3), (count, 6), (count, *points), (count, *points),
             (count, *points), (count, 6), (count, joints),
         )  # fmt: skip
         given = GivenMotion(
             np.zeros((count, 7 + joints)), np.zeros((count, 6 + joints)), np.zeros((count, joints)),
-            np.zeros(pushes),
+            np.zeros((count, pushed, 3)),
         )  # fmt: skip
         terms = MotionTerms(*(np.zeros(shape) for shape in shapes))
-        call = KernelCall(evaluate_motion, self._tree, fixed, given, self._memory, terms)
-        compile_calls([call])
-        return call, given, terms
+        return self._tree, self._fixed, given, motion_memory(joints), terms
+
+    def link_poses(self, position: Array) -> LinkPoses:
+        """Return the poses of the links in n states (n, n_positions), the base first."""
+        _, given, _, place, rotation = self._poses.rows(len(position))
+        given[:] = position
+        self._poses.run()
+        return LinkPoses(self._links, place.copy(), rotation.reshape(*place.shape, 3).copy())
+
+    def _of_poses(self, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``set_poses_at_instants``."""
+        links = len(self._links)
+        return (
+            self._tree, np.zeros((count, self.model.nq)), body_motion(len(self._rotors)),
+            np.zeros((count, links, 3)), np.zeros((count, links, 9)),
+        )  # fmt: skip
 
     def standing_inertia(self, joints: Array) -> tuple[Array, Array]:
         """Return the centre of mass [m] (3,) and the inertia about it [kg m^2] (3, 3) of a robot with those joint
         angles, as rigid, seen from its base.
         """
-        terms = self._at_origin(joints[None], np.zeros((1, len(joints))))
-        return terms.com[0], terms.inertia[0][WHOLE]
+        seen = self._seen_motion(joints[None], np.zeros((1, len(joints))))
+        return seen.com[0].copy(), seen.inertia[0][WHOLE]
 
-    def _at_origin(self, angles: Array, speeds: Array) -> MotionTerms:
-        """Return the terms of the joints' motion, both (n, n_joints), in the base's axes. Of balls the points are the
-        centres.
-        """
-        position, velocity = (
-            np.zeros((len(angles), self.model.nq)),
-            np.zeros((len(angles), self.model.nv)),
-        )
-        position[:, 6] = 1.0
-        position[:, 7:], velocity[:, 6:] = angles, speeds
-        return self._evaluate(self._centres, position, velocity, None, None)
+    def _seen_motion(self, angles: Array, speeds: Array) -> SeenMotion:
+        """Return what the joints' motion, both (n, n_joints), shows from the base, until the next call."""
+        _, _, own_angles, own_speeds, _, seen = self._seen.rows(len(angles))
+        own_angles[:], own_speeds[:] = angles, speeds
+        self._seen.run()
+        found: SeenMotion = seen
+        return found
+
+    def _of_seen(self, count: int) -> tuple[Any, ...]:
+        """Return the arguments of ``see_motion``."""
+        joints, contacts, fixed = len(self._rotors), len(self.contact_frames), self._fixed
+        return (
+            self._tree, FixedPoints(fixed.body[:contacts], fixed.place[:contacts], fixed.below[:contacts]),
+            np.zeros((count, joints)), np.zeros((count, joints)), motion_memory(joints),
+            _seen_memory(count, contacts),
+        )  # fmt: skip
 
     def mass_matrix(self, q: Array) -> Array:
         """Return the joint-space inertia with all rotors."""
@@ -446,30 +438,6 @@ class ExactDynamics:
         change[free] = np.linalg.solve(matrix[np.ix_(free, free)], pushed[free])
         return np.asarray(v + change), np.asarray((matrix @ change - pushed)[6:] * fixed[6:])
 
-    def integrate(
-        self, q: Array, v: Array, joints: JointMotion, force: Array, longest_step: float
-    ) -> list[tuple[float, Array, Array]]:
-        """Return the motion over one interval from the state (q, v) under constant contact forces (n_contacts, 3).
-
-        Returns time since the interval began [s], q and v after every step; ``q`` is followed as
-        position and quaternion, and the joints' part of both is the planned one.
-        """
-        duration = float(joints.duration)
-        count = max(1, int(np.ceil(duration / longest_step - 1e-9)))
-        h = duration / count
-        angles, speeds, _ = joints.at(np.asarray(0.5 * h * np.arange(2 * count + 1)[:, None]))
-        segment = Segments(
-            q[None, :7],
-            v[None, :6],
-            angles,
-            speeds,
-            force[None],
-            np.full(count, h),
-            np.array([count]),
-        )
-        places, rates = self.follow(segment)
-        return [(h * (i + 1), places[i], rates[i]) for i in range(count)]
-
     def follow(self, segments: Segments) -> tuple[Array, Array]:
         """Return the states after every step of all segments in turn: (n_steps, n_positions) and (n_steps,
         n_velocities).
@@ -477,54 +445,48 @@ class ExactDynamics:
         base, twist, angles, speeds, force, steps, counts = segments
         first = np.concatenate([[0], np.cumsum(counts)])
         of_step = np.repeat(np.arange(len(counts)), counts)
-        seen = self._at_origin(angles, speeds)
-        starts, ends = (
-            2 * first[:-1] + np.arange(len(counts)),
-            2 * np.arange(1, len(steps) + 1) + of_step,
-        )
-        inertia, turn = seen.inertia[:, WHOLE], matrices_of_quaternions(base[:, 3:7])
-        inverse: Array = np.asarray(np.linalg.inv(inertia), dtype=np.float64)
-        arms = seen.points[:, : force.shape[1]] - seen.com[:, None]
-        lever = np.einsum("nci,ncj->nij", arms, np.repeat(force, 2 * counts + 1, axis=0))
-        # From the centre of a ball its lowest point is one radius down in the world.
-        moment = np.zeros((len(counts), 3))
-        for ball in self.balls:
-            moment[:, 0] += ball.radius * force[:, ball.point, 1]
-            moment[:, 1] -= ball.radius * force[:, ball.point, 0]
-        com, rate, carried = seen.com[starts], seen.com_velocity[starts], seen.momentum[starts]
-        momentum = times(turn, times(inertia[starts], twist[:, 3:]) + carried)
-        orientation, turning = np.empty((len(steps), 4)), np.empty((len(steps), 3))
-        pushed = PushedTurns(
-            inverse, times(inverse, seen.momentum), np.ascontiguousarray(lever), steps, first,
-            base[:, 3:7].copy(), momentum, moment,
-        )  # fmt: skip
-        run_compiled(KernelCall(follow_turns, pushed, turn_memory(), orientation, turning))
-        # The centre of mass flies a parabola; the base follows from it.
         over = np.cumsum(steps)
-        time = (over - np.concatenate([[0.0], over])[first[of_step]])[:, None]
-        fall = force.sum(axis=1) / self.mass - np.array([0.0, 0.0, GRAVITY])
-        speed = times(turn, twist[:, :3] + cross_products(twist[:, 3:], com) + rate)
-        flown = (
-            (base[:, :3] + times(turn, com))[of_step]
-            + time * speed[of_step]
-            + 0.5 * time**2 * fall[of_step]
-        )
-        flying = speed[of_step] + time * fall[of_step]
-        turns, com = matrices_of_quaternions(orientation), seen.com[ends]
-        spins = times(inverse[ends], times_transposed(turns, turning) - seen.momentum[ends])
-        linear = (
-            times_transposed(turns, flying) - cross_products(spins, com) - seen.com_velocity[ends]
-        )
+        call = self._stretches
+        seen, given, _, pushed, place, velocity = call.rows(len(angles), len(steps), len(counts))
+        for own, found in zip(seen, self._seen_motion(angles, speeds), strict=True):
+            own[:] = found
+        seen.inverse[:] = np.linalg.inv(seen.inertia[:, WHOLE])
+        given.step[:], given.first[:], given.base[:], given.twist[:] = steps, first, base, twist
+        given.passed[:] = over - np.concatenate([[0.0], over])[first[of_step]]
+        given.force[:] = force
+        given.fall[:] = force.sum(axis=1) / self.mass - np.array([0.0, 0.0, GRAVITY])
+        # From the centre of a ball its lowest point is one radius down in the world.
+        given.moment[:] = 0.0
+        for ball in self.balls:
+            given.moment[:, 0] += ball.radius * force[:, ball.point, 1]
+            given.moment[:, 1] -= ball.radius * force[:, ball.point, 0]
+        call.run()
+        ends = 2 * np.arange(1, len(steps) + 1) + of_step
         return (
-            np.hstack([flown - times(turns, com), orientation, angles[ends]]),
-            np.hstack([linear, spins, speeds[ends]]),
+            np.hstack([place, pushed.orientation, angles[ends]]),
+            np.hstack([velocity, speeds[ends]]),
         )
 
 
-def run_compiled(call: KernelCall) -> None:
-    """Make a call as machine code where that can be."""
-    compile_calls([call])
-    call.run()
+def _of_stretches(contacts: int, instants: int, steps: int, count: int) -> tuple[Any, ...]:
+    """Return the arguments of ``follow_stretches``."""
+    given = Stretches(
+        np.zeros(steps), np.zeros(steps), np.zeros(count + 1, np.int64), np.zeros((count, 7)), np.zeros((count, 6)),
+        np.zeros((count, contacts, 3)), np.zeros((count, 3)), np.zeros((count, 3)),
+    )  # fmt: skip
+    pushed = PushedTurns(
+        np.zeros((instants, 3)), np.zeros((instants, 3, 3)), np.zeros((steps, 4)), np.zeros((steps, 3))
+    )  # fmt: skip
+    return (
+        _seen_memory(instants, contacts), given, turn_memory(), pushed, np.zeros((steps, 3)), np.zeros((steps, 6)),
+    )  # fmt: skip
+
+
+def _seen_memory(count: int, contacts: int) -> SeenMotion:
+    return SeenMotion(
+        np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 6)),
+        np.zeros((count, 3, 3)), np.zeros((count, contacts, 3)),
+    )  # fmt: skip
 
 
 @per_robot
@@ -542,21 +504,33 @@ def rotation_between(first: Array, second: Array) -> Array:
     return np.asarray(4.0 * np.arcsin(np.minimum(1.0, 0.5 * half)))
 
 
-def joint_motion(plan_position: Array, plan_velocity: Array, time: Array, knot: int) -> JointMotion:
-    """Return the joints of a plan between that knot and the next."""
-    every = joint_motions(plan_position, plan_velocity, time, np.array([knot]))
-    start, end, before, after, _ = every
-    duration = float(time[knot + 1] - time[knot])
-    return JointMotion(start[0], end[0], before[0], after[0], duration)
+def states_between(
+    place: Array, rate: Array, time: Array, knots: NDArray[np.int64], passed: Array
+) -> Motion:
+    """Return the places and rates of a motion and the rates' changes, each (n, m), at times ``passed`` since some knots,
+    both (n,): the cubics through the places and rates (n_knots, m) of each of these and the knot behind it.
+
+    Where the rates change evenly over an interval this is exactly the motion. At an impact, whose knots are at one time,
+    only a passed time of zero has a meaning.
+    """
+    call = _cubics(place.shape[1])
+    own_place, own_rate, own_time, own_knots, own_passed, *found = call.rows(len(time), len(knots))
+    own_place[:], own_rate[:], own_time[:] = place, rate, time
+    own_knots[:], own_passed[:] = knots, passed
+    call.run()
+    places, rates, changes = (each.copy() for each in found)
+    return places, rates, changes
 
 
-def joint_motions(
-    position: Array, velocity: Array, time: Array, knots: NDArray[np.int64]
-) -> JointMotion:
-    """Return the same between each of some knots and the one behind it."""
-    return JointMotion(
-        position[knots, 7:], position[knots + 1, 7:], velocity[knots, 6:], velocity[knots + 1, 6:],
-        (time[knots + 1] - time[knots])[:, None],
+@cache
+def _cubics(width: int) -> KernelOnRows:
+    """Return the call of ``cubic_motion`` for so many coordinates."""
+    return KernelOnRows(
+        cubic_motion,
+        lambda knots, n: (
+            np.zeros((knots, width)), np.zeros((knots, width)), np.zeros(knots), np.zeros(n, np.int64), np.zeros(n),
+            np.zeros((n, width)), np.zeros((n, width)), np.zeros((n, width)),
+        ),
     )  # fmt: skip
 
 
@@ -564,11 +538,12 @@ def half_steps(
     position: Array, velocity: Array, time: Array, force: Array, knots: NDArray[np.int64]
 ) -> Segments:
     """Return the intervals of a plan from its states at some knots, each in two steps."""
-    joints = joint_motions(position, velocity, time, knots)
-    quarters = np.arange(5)[:, None, None] * (0.25 * joints.duration)
-    angles, speeds, _ = (each.swapaxes(0, 1) for each in joints.at(np.asarray(quarters)))
+    lengths = time[knots + 1] - time[knots]
+    quarters = (np.arange(5) * (0.25 * lengths)[:, None]).ravel()
+    angles, speeds, _ = states_between(
+        position[:, 7:], velocity[:, 6:], time, np.repeat(knots, 5), quarters
+    )
     return Segments(
-        position[knots, :7], velocity[knots, :6],
-        angles.reshape(-1, angles.shape[2]), speeds.reshape(-1, speeds.shape[2]), force[knots],
-        np.repeat(0.5 * (time[knots + 1] - time[knots]), 2), np.full(len(knots), 2),
+        position[knots, :7], velocity[knots, :6], angles, speeds, force[knots],
+        np.repeat(0.5 * lengths, 2), np.full(len(knots), 2),
     )  # fmt: skip

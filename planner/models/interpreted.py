@@ -6,7 +6,7 @@ function: see ``mathematics.compiling.lanes``. The values are CasADi's own to th
 
 from __future__ import annotations
 
-import threading
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array, Indices
 from ...mathematics.compiling.lanes import OPERATIONS, Lanes, Program
+from .python_function import python_function
 
 _SAME = (
     "add", "sub", "mul", "div", "neg", "sqrt", "fabs", "copysign", "sign", "not", "and", "or",
@@ -232,17 +233,40 @@ class InterpretedFunction:
         """Return the pattern of a result."""
         return _sparsity(self.outputs[number])
 
-    def lanes(self, count: int) -> Lanes:
-        """Return the function at ``count`` instants, with memory for its arguments and results."""
+    def lanes(
+        self,
+        count: int,
+        inputs: Sequence[Array] | None = None,
+        outputs: Sequence[Array] | None = None,
+    ) -> Lanes:
+        """Return the function at ``count`` instants, with memory for its arguments and results unless it is given."""
         return Lanes(
             self.program, count,
-            [len(each.rows) for each in self.inputs], [len(each.rows) for each in self.outputs],
+            [len(each.rows) for each in self.inputs] if inputs is None else inputs,
+            [len(each.rows) for each in self.outputs] if outputs is None else outputs,
         )  # fmt: skip
 
     def map(self, count: int) -> Any:
         """Return the function of CasADi for ``count`` instants, whose arguments and results are side by side."""
-        if count not in self._maps:  # kept here, because CasADi keeps no object of Python
-            self._maps[count] = _callback()(self, count)
+        import casadi as ca
+
+        if count not in self._maps:
+            lanes = self.lanes(count)
+
+            def compute(values: Sequence[Array]) -> Sequence[Array]:
+                for own, entries in zip(lanes.inputs, values, strict=True):
+                    own.reshape(-1)[:] = entries
+                lanes.run()
+                return [each.reshape(-1) for each in lanes.outputs]
+
+            given, found = (
+                {
+                    f"{letter}{k}": ca.repmat(_sparsity(each), 1, count)
+                    for k, each in enumerate(some)
+                }
+                for letter, some in (("i", self.inputs), ("o", self.outputs))
+            )
+            self._maps[count] = python_function(f"{self._name}_{count}", given, found, compute)
         return self._maps[count]
 
     def __call__(self, *arguments: Any) -> Any:
@@ -272,56 +296,3 @@ def _sparsity(pattern: Pattern) -> Any:
     import casadi as ca
 
     return ca.Sparsity(*pattern.shape, pattern.starts, pattern.rows)
-
-
-@cache
-def _callback() -> Any:
-    """Return the class of functions that CasADi calls, which needs CasADi to be defined."""
-    import casadi as ca
-
-    class Mapped(ca.Callback):
-        """An interpreted function at a number of instants."""
-
-        def __init__(self, function: InterpretedFunction, count: int) -> None:
-            ca.Callback.__init__(self)
-            self._given = [ca.repmat(_sparsity(each), 1, count) for each in function.inputs]
-            self._found = [ca.repmat(_sparsity(each), 1, count) for each in function.outputs]
-            self._lanes, self._lock = function.lanes(count), threading.Lock()
-            self._arguments, self._results = (
-                [_bytes(array) for array in arrays]
-                for arrays in (self._lanes.inputs, self._lanes.outputs)
-            )
-            self.construct(f"{function.name()}_{count}", {})
-
-        def get_n_in(self) -> int:
-            return len(self._given)
-
-        def get_n_out(self) -> int:
-            return len(self._found)
-
-        def get_sparsity_in(self, number: int) -> Any:
-            return self._given[number]
-
-        def get_sparsity_out(self, number: int) -> Any:
-            return self._found[number]
-
-        def has_eval_buffer(self) -> bool:
-            return True
-
-        def eval_buffer(self, arguments: Any, results: Any) -> int:
-            """Copy CasADi's arguments in, of which zeros may be missing, and the results out that it asks for."""
-            with self._lock:  # CasADi gives the interpreter's lock back, so another thread may call
-                for own, given in zip(self._arguments, arguments, strict=True):
-                    own[:] = bytes(len(own)) if given is None else given
-                self._lanes.run()
-                for own, wanted in zip(self._results, results, strict=True):
-                    if wanted is not None:
-                        wanted[:] = own
-            return 0
-
-    return Mapped
-
-
-def _bytes(array: Any) -> memoryview:
-    """Return an array's memory."""
-    return memoryview(array.reshape(-1)).cast("B")

@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from ...mathematics.arrays import Array
-from ...mathematics.compiling.kernel_call import KernelCall
+from ...mathematics.compiling.compile_calls import run_compiled
 from ...mathematics.rotations import matrices_of_quaternions
 from ...mathematics.segment_distances import capsule_gaps
+from ...mathematics.whole_body_motion import place_points
 from ...robots.description import Capsule, Hull, RobotDescription, Shape, Vector3
 from ...robots.kinematics import LinkPoses, from_base_outwards
 from ...robots.limb import chain_to
 from ...robots.shapes import convex, edges
 from ...robots.surfaces import quaternion_from_z
 from ..task.scaling import per_robot
-from .exact_dynamics import run_compiled
 
 FAR = 0.1
 """m; shapes that are known to be that far apart are not measured exactly."""
@@ -28,28 +28,49 @@ FAR = 0.1
 
 @dataclass(frozen=True)
 class MovingShape:
-    """A ``shape`` of a link that has these positions (n, 3) [m] and rotations (n, 3, 3) at n instants."""
+    """A ``shape`` of a link that has these positions (n, 3) [m] and rotations (n, 3, 3) at n instants, with its corners
+    there, (n_corners, n, 3) [m].
+    """
 
     shape: Shape
     position: Array
     rotation: Array
+    corners: Array
 
     def place(self, point: Vector3) -> Array:
         """Return the place of a point of the link, (n, 3) [m]."""
         return np.asarray(self.position + self.rotation @ np.array(point))
 
-    def corners(self) -> Array:
-        """Return the places of the shape's corners, (n_corners, n, 3) [m]."""
-        return np.array([self.place(corner) for corner in self.shape.corners])
-
     def edges(self) -> list[tuple[Array, Array]]:
-        """Return the ends of its edges, each (n, 3) [m]; see ``hulls.edges``."""
+        """Return the ends of its edges, each (n, 3) [m]; see ``robots.shapes.edges``."""
         return [(self.place(start), self.place(end)) for start, end in edges(self.shape)]
 
 
-def moving_shapes(robot: RobotDescription, poses: LinkPoses, link: str) -> list[MovingShape]:
-    """Return the shapes of a link at the instants of the poses."""
-    return [MovingShape(shape, *poses.of(link)) for shape in robot.link(link).shapes]
+def moving_shapes(robot: RobotDescription, poses: LinkPoses) -> dict[str, list[MovingShape]]:
+    """Return the shapes of every link, by its name, at the instants of the poses."""
+    links, corners = _corners(robot)
+    count = len(poses.position)
+    places = np.empty((len(links), count, 3))
+    run_compiled(
+        place_points, poses.position, poses.rotation.reshape(count, -1, 9),
+        np.array([poses.names.index(link) for link in links], dtype=np.int64), corners, places,
+    )  # fmt: skip
+    found, first = dict[str, list[MovingShape]](), 0
+    for link in robot.links:
+        found[link.name] = []
+        for shape in link.shapes:
+            stop = first + len(shape.corners)
+            moving = MovingShape(shape, *poses.of(link.name), places[first:stop])
+            found[link.name].append(moving)
+            first = stop
+    return found
+
+
+@per_robot
+def _corners(robot: RobotDescription) -> tuple[list[str], Array]:
+    """Return the link of every corner of all shapes, and the corners in its frame, (n, 3) [m]."""
+    found = [(link.name, c) for link in robot.links for s in link.shapes for c in s.corners]
+    return [link for link, _ in found], np.array([c for _, c in found]).reshape(-1, 3)
 
 
 @per_robot
@@ -81,10 +102,10 @@ def gaps_between(some: Sequence[MovingShape], others: Sequence[MovingShape]) -> 
         return np.zeros((0, 0))
     gaps = np.zeros((len(some) * len(others), len(some[0].position)))
     if all(isinstance(each.shape, Capsule) for each in (*some, *others)):
-        ends = [np.stack([each.corners() for each in group]) for group in (some, others)]
+        ends = [np.stack([each.corners for each in group]) for group in (some, others)]
         radii = [np.array([each.shape.radius for each in group]) for group in (some, others)]
         parts = [(whole[:, 0], whole[:, 1], r) for whole, r in zip(ends, radii, strict=True)]
-        run_compiled(KernelCall(capsule_gaps, *parts[0], *parts[1], gaps))
+        run_compiled(capsule_gaps, *parts[0], *parts[1], gaps)
         return gaps
     for row, (one, other) in zip(gaps, product(some, others), strict=True):
         _fill_gaps(one, other, row)

@@ -89,13 +89,13 @@ def _clear(
     clear = np.ones(len(q), bool)
     here = int(np.ravel_multi_index(start, grid.shape[:-1]))
     side = float(np.sign(poses.of(arm[0])[0][here, 1]))
+    shapes = moving_shapes(robot, poses)
     for link in arm:
-        for each in moving_shapes(robot, poses, link) if side else ():
-            inside = (side * each.corners()[:, :, 1]).min(axis=0) - each.shape.radius
+        for each in shapes[link] if side else ():
+            inside = (side * each.corners[:, :, 1]).min(axis=0) - each.shape.radius
             clear &= clearance_deficit(inside[None], 0.5 * gap, here) <= 0.0
         for other in trunk:
-            own, body = (moving_shapes(robot, poses, name) for name in (link, other))
-            if own and body:
-                gaps = gaps_between(own, body)
+            if shapes[link] and shapes[other]:
+                gaps = gaps_between(shapes[link], shapes[other])
                 clear &= clearance_deficit(gaps, gap, here, carried=other == carrier[link]) <= 0.0
     return np.asarray(clear.reshape(grid.shape[:-1]))

@@ -1,9 +1,7 @@
 """Assembly of pieces on knots into one sparse problem in fatrop's order.
 
 Variables are ordered knot by knot: state, then controls. Constraint rows are ordered knot by knot:
-the gap to the next state (next state minus what this knot leads to), then the rest. The functions
-of the whole problem are CasADi graphs that call the pieces' functions and gather their non-zeros,
-so nothing is differentiated here.
+the gap to the next state (next state minus what this knot leads to), then the rest.
 """
 
 from __future__ import annotations
@@ -38,7 +36,7 @@ class Knot:
 
 
 class Assembly:
-    """The functions of the whole problem, and where everything is in its vectors.
+    """The structure of the whole problem: where everything is in its vectors.
 
     Attributes:
         variables, constraints, parameters: the sizes.
@@ -149,101 +147,12 @@ class Assembly:
             np.array(signs),
         )
 
-    # The functions of the whole problem
-
-    def functions(self, *, upper: bool = True) -> dict[str, Any]:
-        """Return ``f``, ``g`` (symbols and expressions in a dict for nlpsol) and the derivative functions ``nlp_f``,
-        ``nlp_g``, ``nlp_grad_f``, ``nlp_jac_g``, ``nlp_hess_l`` with the signatures nlpsol's own would have; with
-        ``upper`` also ``hess_lag``, the upper triangle of the Hessian alone.
-        """
-        import casadi as ca
-
-        x, p = ca.MX.sym("x", self.variables), ca.MX.sym("p", self.parameters)
-        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.constraints)
-        cost: Any = ca.MX(0)
-        value_rows, gradient, hessian_values, slopes = [], [], [], []
-        jacobian_cost_rows: list[Indices] = []
-        padded = ca.vertcat(lam_g, 0.0)
-        for name, users in self.users.items():
-            piece, count = self.pieces[name], len(users)
-            z = _gather(x, self.piece_columns[name].ravel(), (-1, count))
-            w = ca.reshape(p[self.piece_parameters[name]], -1, count)
-            costs, rows = piece.value.map(count)(z, w)
-            cost = cost + ca.sum2(costs)
-            value_rows.append(ca.vec(rows))
-            gradient.append(ca.vec(piece.gradient.map(count)(z, w)))
-            jacobian_cost_rows.append(self.piece_columns[name].ravel())
-            index = np.where(self.piece_rows[name] < 0, self.constraints, self.piece_rows[name])
-            multipliers = _gather(padded, index.ravel(), (-1, count))
-            slope, hessian = piece.hessian.map(count)(z, w, ca.repmat(lam_f, 1, count), multipliers)
-            slopes.append(ca.vec(slope))
-            hessian_values.append(_nonzeros(hessian))
-        g = self._sum_rows(x, value_rows)
-        columns = np.concatenate(jacobian_cost_rows)
-        grad = _scatter(ca.vertcat(*gradient), columns, self.variables)
-        whole, *triangle = self._hessian(hessian_values, upper)
-        linear_rows, linear_columns, signs = self.linear_terms
-        pushed = _gather(lam_g, linear_rows, (-1, 1)) * ca.DM(signs)
-        slope = _scatter(
-            ca.vertcat(*slopes, pushed), np.concatenate([columns, linear_columns]), self.variables
-        )
-        names = ["x", "p"]
-        lagrangian = ["x", "p", "lam_f", "lam_g"]
-        found = {
-            "x": x, "p": p, "f": cost, "g": g,
-            "nlp_f": ca.Function("nlp_f", [x, p], [cost], names, ["f"]),
-            "nlp_g": ca.Function("nlp_g", [x, p], [g], names, ["g"]),
-            "nlp_grad_f": ca.Function("nlp_grad_f", [x, p], [grad], names, ["grad_f_x"]),
-            "grad_f": ca.Function("nlp_grad_f", [x, p], [cost, grad], names, ["f", "grad_f_x"]),
-            "nlp_jac_g": self.jacobian(),
-            "nlp_hess_l": ca.Function(
-                "nlp_hess_l", [x, p, lam_f, lam_g], [slope, whole], lagrangian,
-                ["grad_gamma_x", "hess_gamma_x_x"]),
-            # nlpsol evaluates this once after fatrop ends; nobody reads its gradients.
-            "nlp_grad": ca.Function(
-                "nlp_grad", [x, p, lam_f, lam_g],
-                [cost, g, ca.MX.zeros(self.variables), ca.MX.zeros(self.parameters)], lagrangian,
-                ["f", "g", "grad_gamma_x", "grad_gamma_p"]),
-        }  # fmt: skip
-        if triangle:
-            found["hess_lag"] = ca.Function(
-                "nlp_hess_l", [x, p, lam_f, lam_g], triangle, lagrangian, ["triu_hess_gamma_x_x"]
-            )
-        return found
-
-    def jacobian(self) -> Any:
-        """Return the function ``nlp_jac_g`` alone."""
-        import casadi as ca
-
-        x, p = ca.MX.sym("x", self.variables), ca.MX.sym("p", self.parameters)
-        rows, values = [], []
-        for name, users in self.users.items():
-            z = _gather(x, self.piece_columns[name].ravel(), (-1, len(users)))
-            w = ca.reshape(p[self.piece_parameters[name]], -1, len(users))
-            found, jacobian = self.pieces[name].jacobian.map(len(users))(z, w)
-            rows.append(ca.vec(found))
-            values.append(_nonzeros(jacobian))
-        matrix = self._jacobian(values)
-        return ca.Function("nlp_jac_g", [x, p], [self._sum_rows(x, rows), matrix],
-                           ["x", "p"], ["g", "jac_g_x"])  # fmt: skip
-
     def row_sources(self) -> Indices:
         """Return by row its place among the rows of all pieces side by side; behind them is a zero."""
         index = np.concatenate([self.piece_rows[name].ravel() for name in self.users])
         source = np.full(self.constraints, len(index), dtype=np.int64)
         source[index[index >= 0]] = np.flatnonzero(index >= 0)
         return source
-
-    def _sum_rows(self, x: Any, rows: list[Any]) -> Any:
-        import casadi as ca
-
-        linear_rows, linear_columns, signs = self.linear_terms
-        sums = _gather(ca.vertcat(*rows, 0.0), self.row_sources(), (-1, 1))
-        matrix = _sparse(linear_rows, linear_columns, (self.constraints, self.variables))
-        order = _positions(matrix, linear_rows, linear_columns)
-        values = np.zeros(len(signs))
-        values[order] = signs
-        return sums + ca.mtimes(ca.DM(matrix, values), x)
 
     def jacobian_pattern(self) -> tuple[Any, Indices]:
         """Return where the Jacobian has entries, and by entry its place among those of all pieces side by side; behind
@@ -264,17 +173,10 @@ class Assembly:
         source[_positions(pattern, row[kept], column[kept])] = np.flatnonzero(kept)
         return pattern, source
 
-    def _jacobian(self, values: list[Any]) -> Any:
-        import casadi as ca
-
-        pattern, source = self.jacobian_pattern()
-        everything = ca.vertcat(*values, ca.DM(self.linear_terms[2]))
-        return ca.MX(pattern, _gather(everything, source, (-1, 1)))
-
-    def _hessian(self, values: list[Any], upper: bool) -> list[Any]:
-        """Return the whole symmetric matrix, and its upper triangle if ``upper`` is set."""
-        import casadi as ca
-
+    def hessian_pattern(self, upper: bool) -> tuple[Any, Indices, list[tuple[Indices, Indices]]]:
+        """Return where the symmetric Hessian has entries, or its upper triangle; by entry the place of its first value among
+        those of all pieces side by side; and then, until no value is left, the entries that have a further one, and its place.
+        """
         rows, columns = [], []
         for name in self.users:
             triplets = self.pieces[name].hessian.sparsity_out(1).get_triplet()
@@ -282,61 +184,16 @@ class Assembly:
             rows.append(self.piece_columns[name][:, local_rows].ravel())
             columns.append(self.piece_columns[name][:, local_columns].ravel())
         row, column = np.concatenate(rows), np.concatenate(columns)
-        everything = ca.vertcat(*values, 0.0)
-        found = []
-        for kept in (np.full(len(row), True), row <= column)[: 1 + upper]:
-            pattern = _sparse(row[kept], column[kept], (self.variables, self.variables))
-            place = _positions(pattern, row[kept], column[kept])
-            source = np.flatnonzero(kept)
-            layers = _layers(place, source, pattern.nnz(), len(row))
-            total: Any = _gather(everything, layers[0], (-1, 1))
-            for entries, index in layers[1:]:
-                total = total + _scatter(
-                    _gather(everything, index, (-1, 1)), entries, pattern.nnz()
-                )
-            found.append(ca.MX(pattern, total))
-        return found
-
-
-def _layers(place: Indices, source: Indices, size: int, empty: int) -> list[Any]:
-    """Return sums of several values an entry as gathers: the first value of every entry, then the entries and values
-    that are still left over, until none is.
-    """
-    first = np.full(size, empty, dtype=np.int64)
-    layers: list[Any] = [first]
-    while len(place):
-        entries, index = np.unique(place, return_index=True)
-        if len(layers) == 1 and layers[0] is first and np.all(first == empty):
-            first[entries] = source[index]
-        else:
+        source = np.flatnonzero(row <= column) if upper else np.arange(len(row))
+        row, column = row[source], column[source]
+        pattern = _sparse(row, column, (self.variables, self.variables))
+        place = _positions(pattern, row, column)
+        layers: list[tuple[Indices, Indices]] = []
+        while len(place):
+            entries, index = np.unique(place, return_index=True)
             layers.append((entries, source[index]))
-        left = np.ones(len(place), dtype=bool)
-        left[index] = False
-        place, source = place[left], source[left]
-    return layers
-
-
-def _gather(vector: Any, index: Indices, shape: tuple[int, int]) -> Any:
-    """Return those entries of a dense vector."""
-    import casadi as ca
-
-    return ca.reshape(vector.nz[index.tolist()], *shape) if len(index) else ca.MX(0, 1)
-
-
-def _scatter(values: Any, index: Indices, size: int) -> Any:
-    """Return a dense vector with the values added up at their entries."""
-    import casadi as ca
-
-    columns = np.arange(len(index))
-    matrix = ca.DM(_sparse(index, columns, (size, len(index))), 1.0)
-    return ca.densify(ca.mtimes(matrix, values))
-
-
-def _nonzeros(matrix: Any) -> Any:
-    """Return the non-zeros as a dense column."""
-    import casadi as ca
-
-    return matrix.nz[:] if matrix.nnz() else ca.MX(0, 1)
+            place, source = np.delete(place, index), np.delete(source, index)
+        return pattern, layers[0][1], layers[1:]
 
 
 def _sparse(rows: Indices, columns: Indices, shape: tuple[int, int]) -> Any:

@@ -13,6 +13,7 @@ of the phase's mean.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -72,22 +73,22 @@ class ProblemPhase:
     contacts: tuple[int, ...]
     impact: bool = False
 
-    @property
+    @cached_property
     def flies(self) -> bool:
         """True if the robot is in the air."""
         return self.phase is Phase.FLIGHT
 
-    @property
+    @cached_property
     def timed(self) -> bool:
         """True if the mean length of its intervals is a state."""
         return self.flies or self.time is None
 
-    @property
+    @cached_property
     def stop(self) -> int:
         """The knot at which it ends."""
         return self.first + self.count
 
-    @property
+    @cached_property
     def piece(self) -> str:
         """The piece that its intervals are made of."""
         if self.impact:

@@ -197,7 +197,7 @@ def step_parameters(
     """
     ground, step = start.z, hop.landing_height or 0.0
     onwards = 1.0 if (hop.distance_x or 0.0) >= 0.0 else -1.0
-    if edge is not None:
+    if edge is not None and beside:
         edge -= math.copysign(beside, step_of(hop, start)) * onwards
     if leans:
         before, after = np.array(start.plane), np.array(end.plane)

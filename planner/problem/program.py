@@ -12,7 +12,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.constants import GRAVITY
 from ...robots.description import RobotDescription
-from ..models.exact_dynamics import ExactDynamics, half_steps, joint_motions
+from ..models.exact_dynamics import ExactDynamics, half_steps, states_between
 from ..models.robot_model import Stance
 from ..models.symbolic_model import SymbolicModel
 from ..task.boundary_set import unsupported_keys
@@ -126,8 +126,8 @@ def joint_torques(
     torque = np.zeros((len(time), velocity.shape[1] - 6))
     lasting = np.flatnonzero(np.diff(time) > 0.0)
     places, rates = dynamics.follow(half_steps(position, velocity, time, force, lasting))
-    half = 0.5 * np.diff(time)[lasting][:, None]
-    bend = joint_motions(position, velocity, time, lasting).at(half)[2]
+    half = 0.5 * np.diff(time)[lasting]
+    _, _, bend = states_between(position[:, 7:], velocity[:, 6:], time, lasting, half)
     torque[lasting] = dynamics.motion(places[::2], rates[::2], bend, force[lasting]).torque
     torque[-1] = torque[-2]
     return torque

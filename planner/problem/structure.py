@@ -240,7 +240,9 @@ class Structure:
         """Take on where the task leads."""
         self.task, self.stances = task, tuple(stances)
         self.hops, self.places = task.hops(), task.places()
-        self._edges = [edge_of(hop, at) for hop, at in zip(self.hops, self.places, strict=False)]
+        begun = [*zip(self.hops, self.places, strict=False)]
+        self._edges = [edge_of(hop, at) for hop, at in begun]
+        self._steps = [step_of(hop, at) for hop, at in begun]
 
     def _give(
         self, k: int, knot: Knot, problem_phase: ProblemPhase, timed: ProblemPhase | None
@@ -374,8 +376,7 @@ class Structure:
     def step_under(self, k: int) -> tuple[float, float | None]:
         """Return the step's height and its edge under a flight."""
         place = self.of_knot[k].place
-        hop = self.hops[place]
-        return step_of(hop, self.places[place]), self._edges[place]
+        return self._steps[place], self._edges[place]
 
     def over_step(self, k: int) -> tuple[bool, bool]:
         """Return whether feet are above the higher ground at a flight's knot, and whether they are on the lower side of

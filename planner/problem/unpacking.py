@@ -94,8 +94,8 @@ def unpack(problem: FullProblem, values: Array) -> dict[str, Any]:
     assembly, coordinates, model = problem.assembly, problem.coordinates, problem.exact
     n, count = coordinates.size, problem.knots
     times = knot_times(problem, values)
-    q = np.array([values[s : s + n] for s in assembly.state_start]) @ coordinates.matrix.T
-    v = np.array([values[s + n : s + 2 * n] for s in assembly.state_start]) @ coordinates.matrix.T
+    states = values[assembly.state_start[:, None] + np.arange(2 * n)]
+    q, v = states[:, :n] @ coordinates.matrix.T, states[:, n:] @ coordinates.matrix.T
     bend, force = np.zeros((count, model.size)), np.zeros((count, 3 * len(model.robot.contacts)))
     grounded = np.zeros((count, len(model.robot.contacts)), dtype=bool)
     impacts = np.zeros(count, dtype=bool)
@@ -178,9 +178,7 @@ def can_start(problem: FullProblem, plan: PlannedJump) -> bool:
     """Check whether a plan goes through the same phases, so that ``pack`` can make variables of it."""
     if _same_grid(problem, plan):
         return True
-    impacts = bool(np.any(np.diff(plan.time) <= 0.0)) or any(
-        s.impact for s in problem.problem_phases
-    )
+    impacts = bool(np.any(plan.steps <= 0.0)) or any(s.impact for s in problem.problem_phases)
     return not impacts and same_phases(
         plan.phase[:-1].tolist(), [int(phase) for phase in problem.phases]
     )
@@ -193,7 +191,7 @@ def _same_grid(problem: FullProblem, plan: PlannedJump) -> bool:
     return (
         intervals
         and plan.phase[:-1].tolist() == [int(phase) for phase in problem.phases]
-        and set(np.flatnonzero(np.diff(plan.time) <= 0.0).tolist()) == impacts
+        and set(np.flatnonzero(plan.steps <= 0.0).tolist()) == impacts
     )
 
 
@@ -206,7 +204,7 @@ def pack(problem: FullProblem, plan: PlannedJump, guess: Array | None = None) ->
     assembly, coordinates = problem.assembly, problem.coordinates
     n = coordinates.size
     q, v = coordinates_of(plan.position, plan.velocity)
-    steps, force = np.diff(plan.time), plan.contact_force.reshape(len(plan.time), -1)
+    steps, force = plan.steps, plan.contact_force.reshape(len(plan.time), -1)
     instants = plan.time
     if not _same_grid(problem, plan):
         phases = [int(phase) for phase in problem.phases]
@@ -255,7 +253,7 @@ def pack(problem: FullProblem, plan: PlannedJump, guess: Array | None = None) ->
 
 _evaluators: dict[tuple[int, int], tuple[SymbolicModel, tuple[Lanes, ...]]] = {}
 KEPT = 32
-"""Evaluators that are kept, of a model and a number of instants."""
+"""Evaluators that are kept, of a model and a number of instants, and functions of models."""
 
 
 def _evaluate(
@@ -298,6 +296,8 @@ def _functions(model: SymbolicModel, pushed: int) -> tuple[Any, Any]:
     import casadi as ca
 
     if id(model) not in _of_models:
+        if len(_of_models) >= KEPT:
+            _of_models.clear()
         place, rate, bend_of = (ca.SX.sym(name, model.size) for name in ("q", "v", "a"))
         pushes = ca.SX.sym("F", pushed)
         whole = centroidal_momentum(model, place, rate)

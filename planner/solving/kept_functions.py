@@ -105,7 +105,10 @@ def load_functions(
 ) -> dict[str, StageFunction]:
     """Return the same for any set of pieces."""
     key = content_hash(model.robot, functions.name, functions.sources, model.loads)
-    held = _held.setdefault(key, {})
+    held = _held.pop(key, {})
+    _held[key] = held  # behind all others, of which the first was not asked for the longest
+    if len(_held) > KEPT:
+        _held.pop(next(iter(_held)), None)
     missing = [name for name in functions.pieces if name not in held]
     for count, name in enumerate(missing):
         kept = FUNCTIONS.load(f"{key}/{name}")
@@ -122,6 +125,8 @@ def load_functions(
     return {name: held[name] for name in functions.pieces}
 
 
+KEPT = 8
+"""Sets of functions that are held, each of up to 30 MB: a study may plan for hundreds of robots."""
 _held: dict[str, dict[str, StageFunction]] = {}
 
 

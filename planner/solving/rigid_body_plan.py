@@ -245,8 +245,8 @@ def unpack(
         if phase is not Phase.FLIGHT:
             force[k] = problem.control(values, k)[6 : 6 + force.shape[1]]
     force[-1] = force[-2]
-    position = np.array([pose_of(row) for row in q])
-    velocity = np.array([twist_of(*row)[0] for row in zip(q, v, np.zeros_like(v), strict=True)])
+    position = pose_of(q)
+    velocity = twist_of(q, v, np.zeros_like(v))[0]
     turn = matrices_of_quaternions(position[:, 3:7])
     momentum = np.array([
         r @ body.inertia @ w for r, w in zip(turn, velocity[:, 3:6], strict=True)

@@ -13,6 +13,8 @@ import numpy as np
 
 from ...mathematics.arrays import Array
 from ..problem.assembly import Assembly, NonlinearProgram
+from ..problem.program_functions import program_functions
+from .blasfeo import use_fast_product
 from .solver_process import call_bounded, call_solver, cpu_time, without_output
 
 VIOLATION = 1e-6
@@ -143,7 +145,7 @@ class Solver:
 
     def __init__(self, assembly: Assembly, name: str, barrier: float, limit: int) -> None:
         self._made_of = (assembly, name, barrier, limit)
-        self._functions = assembly.functions(upper=name != "fatrop")
+        self._functions = program_functions(assembly, upper=name != "fatrop")
         self.cost, self.constraints = self._functions["nlp_f"], self._functions["nlp_g"]
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -216,4 +218,7 @@ def _make_solver(
             "grad_f": functions["grad_f"], "no_nlp_grad": True, "ipopt": own,
         }  # fmt: skip
     with without_output():
-        return ca.nlpsol("jump", name, nlp, options)
+        made = ca.nlpsol("jump", name, nlp, options)
+    if name == "fatrop":
+        use_fast_product()
+    return made

@@ -14,6 +14,7 @@ import io
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from ...mathematics.arrays import Array
 from ...robots.description import RobotDescription
 from ...runtime.language.errors import AloftError
 from .files import write_whole
+from .phase import Phase
 from .task import JumpTask, JumpTaskError, make_task
 
 FILE_FORMAT = "aloft jump plan 1"
@@ -31,6 +33,15 @@ FILE_FORMAT = "aloft jump plan 1"
 
 class PlanFileError(AloftError, ValueError):
     """A file is no plan, or one of another format."""
+
+
+class InvalidPlanError(AloftError):
+    """A plan failed the validity check; the message names the tests that failed. ``plan`` is that
+    plan with its report, to look at and not to run."""
+
+    def __init__(self, message: str, plan: PlannedJump) -> None:
+        super().__init__(message)
+        self.plan = plan
 
 
 @dataclass(frozen=True)
@@ -91,8 +102,39 @@ class PlannedJump:
                 raise ValueError(
                     f"{name} has {len(getattr(self, name))} rows, but the plan has {knots} knots"
                 )
-        if knots < 2 or np.any(np.diff(self.time) < 0.0):
+        if knots < 2 or np.any(self.steps < 0.0):
             raise ValueError("a plan needs two knots or more, with times that never decrease")
+
+    @cached_property
+    def steps(self) -> Array:
+        """How long the intervals last [s], (N - 1,); those of impacts do not."""
+        return np.asarray(self.time[1:] - self.time[:-1])
+
+    @cached_property
+    def lasting(self) -> NDArray[np.int64]:
+        """The intervals that last."""
+        return np.flatnonzero(self.steps > 0.0)
+
+    @cached_property
+    def flight_knots(self) -> tuple[tuple[int, int], ...]:
+        """The knots at lift-off and at touchdown of every flight, the latter before any impact.
+
+        Raises:
+            ValueError: there are more or fewer flights than jumps.
+        """
+        flying = np.flatnonzero((self.phase[:-1] == Phase.FLIGHT) & (self.steps > 0.0))
+        found = [
+            (int(run[0]), int(run[-1]) + 1)
+            for run in np.split(flying, np.flatnonzero(np.diff(flying) > 1) + 1)
+            if len(run)
+        ]
+        jumps = len(self.task.hops())
+        if len(found) != jumps:
+            raise ValueError(
+                f"a plan has a flight, of intervals one after the other, for every jump; found "
+                f"{len(found)} for {jumps}"
+            )
+        return tuple(found)
 
     @property
     def duration(self) -> float:

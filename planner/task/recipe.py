@@ -175,14 +175,16 @@ def choices(task: RecipeInputs, robot: RobotDescription) -> tuple[Choice, ...]:
 
 def chosen_fields(task: RecipeInputs, found: tuple[Choice, ...]) -> dict[str, Any]:
     """Return the task's fields with those choices."""
-    fields: dict[str, Any] = {}
+    fields, parts = dict[str, Any](), dict[str, dict[str, Any]]()
     for choice in found:
         group, _, name = choice.parameter.partition(".")
-        if not name:
+        if name:
+            parts.setdefault(group, {})[name] = choice.value
+        else:
             fields[group] = choice.value
-            continue
+    for group, changed in parts.items():
         before = fields.get(group) or getattr(task, group) or Margins()
-        fields[group] = before.model_copy(update={name: choice.value})
+        fields[group] = before.model_copy(update=changed)
     return fields
 
 

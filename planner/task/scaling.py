@@ -19,7 +19,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
-from ...mathematics.arrays import Array
+from ...mathematics.arrays import Array, Indices
 from ...mathematics.linear_algebra import product
 from ...robots.description import RobotDescription
 from ...robots.kinematics import LinkPoses, link_poses
@@ -58,7 +58,8 @@ def per_robot(function: _OfRobot[_Parameters, _Result]) -> _OfRobot[_Parameters,
         robot: RobotDescription, *args: _Parameters.args, **kwargs: _Parameters.kwargs
     ) -> _Result:
         # A description is not hashable, and two of the same content may be different objects.
-        key = _text_of(robot), f"{args} {sorted(kwargs.items())}"
+        given = f"{args} {sorted(kwargs.items())}" if args or kwargs else ""
+        key = _text_of(robot), given
         if key not in kept:
             kept[key] = function(robot, *args, **kwargs)
         kept.move_to_end(key)
@@ -158,6 +159,7 @@ def least_distance_to_limits(robot: RobotDescription) -> float:
     return float(min((angles - limits[:, 0])[moving].min(), (limits[:, 1] - angles)[moving].min()))
 
 
+@per_robot
 def _knee(
     robot: RobotDescription, link: str, sole: tuple[float, float, float]
 ) -> tuple[int, float] | None:
@@ -165,12 +167,15 @@ def _knee(
     longest; ``None`` for a leg that no hinge bends.
     """
     chain = [k for k in chain_to(robot, link) if robot.joints[k].kind == "hinge"]
+    if not chain:
+        return None
+    each = np.repeat(chain, 2)  # one joint after the other, to both sides
+    around = robot.standing_position[each] + np.tile([-0.05, 0.05], len(chain))
+    lengths = _lengths(robot, link, sole, chain[0], each, around)
     best, least = None, LEAST_CHANGE
-    for k in chain:
-        around = robot.standing_position[k] + np.array([-0.05, 0.05])
-        change = abs(float(np.diff(_lengths(robot, link, sole, chain[0], k, around))[0])) / 0.1
+    for k, change in zip(chain, np.abs(lengths[1::2] - lengths[::2]) / 0.1, strict=True):
         if change > least:
-            best, least = k, change
+            best, least = k, float(change)
     if best is None:
         return None
     # A sole ahead of its ankle would make a bent leg the longest.
@@ -178,18 +183,19 @@ def _knee(
     if after:
         link, sole = robot.joints[after[0]].child, (0.0, 0.0, 0.0)
     angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, 181)
-    lengths = _lengths(robot, link, sole, chain[0], best, angles)
+    lengths = _lengths(robot, link, sole, chain[0], np.repeat(best, 181), angles)
     return best, round(float(angles[int(lengths.argmax())]), 2)
 
 
 def _lengths(
     robot: RobotDescription, link: str, sole: tuple[float, float, float],
-    first: int, joint: int, angles: Array,
+    first: int, joints: Indices, angles: Array,
 ) -> Array:  # fmt: skip
-    """Return the distances [m] from a leg's first joint to a place of a link, with one joint at those angles."""
+    """Return the distances [m] from a leg's first joint to a place of a link, (n,), each with one joint of the standing
+    robot (n,) at an angle (n,)."""
     positions = np.tile(robot.standing_position, (len(angles), 1))
-    positions[:, joint] = angles
     count = len(angles)
+    positions[np.arange(count), joints] = angles
     poses = link_poses(
         robot, np.zeros((count, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)), positions
     )

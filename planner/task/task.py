@@ -285,10 +285,11 @@ class JumpTask(FreeTimes):
         return self
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """Copy the task as pydantic does, without what ``hops`` and ``places`` have kept."""
+        """Copy the task as pydantic does, with what ``hops`` and ``places`` have kept only where these stay the same."""
         copy = super().model_copy(update=update, deep=deep)
-        for name in ("_every_hop", "_every_place"):
-            vars(copy).pop(name, None)
+        if not _LEADING.isdisjoint(update or ()):
+            for name in ("_every_hop", "_every_place"):
+                vars(copy).pop(name, None)
         return copy
 
     def hops(self) -> tuple[Hop, ...]:
@@ -438,6 +439,10 @@ def planned_robot(robot: RobotDescription) -> dict[str, Any]:
     on sensors that are mounted on links.
     """
     return robot.changed(profile="", sensors=robot.sensors.built_in).model_dump(mode="json")
+
+
+_LEADING = frozenset((*Hop.model_fields, "jumps", "repeat", "slope", "rough", "stairs"))
+"""The parameters that ``hops`` and ``places`` follow from."""
 
 
 def _stance(robot: RobotDescription, given: Mapping[str, float], which: str) -> dict[str, float]:

@@ -14,7 +14,7 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ...mathematics.rotations import from_euler, matrices_of_quaternions, quaternions_of_matrices
 from . import capsules as fit
-from .package_files import SCHEME, find_file
+from .package_files import located
 from .urdf_text import XmlFile
 
 
@@ -128,19 +128,6 @@ def numbers(text: str | None, usual: Sequence[float]) -> Array:
         values = np.zeros(0)
     good = len(values) == len(usual) and bool(np.isfinite(values).all())
     return values if good else np.array(usual, dtype=float)
-
-
-def located(name: str, folder: Path) -> str:
-    """Return a mesh's name in a description, by which it is found from any folder.
-
-    A package that Python has installed keeps its name, which serves other machines too.
-    """
-    if name.startswith(SCHEME) and find_file(name, Path(folder.root or "/")) is not None:
-        return name
-    path = find_file(name, folder)
-    if path is None:
-        return name if name.startswith(SCHEME) else str((folder / name).absolute())
-    return str(path.resolve())
 
 
 def link_looks(

@@ -29,6 +29,19 @@ def find_file(name: str, folder: Path) -> Path | None:
     return next((p for root in _roots(package, folder) if (p := root / rest).is_file()), None)
 
 
+def located(name: str, folder: Path) -> str:
+    """Return a file's name in a description, by which it is found from any folder.
+
+    A package that Python has installed keeps its name, which serves other machines too.
+    """
+    if name.startswith(SCHEME) and find_file(name, Path(folder.root or "/")) is not None:
+        return name
+    path = find_file(name, folder)
+    if path is None:
+        return name if name.startswith(SCHEME) else str((folder / name).absolute())
+    return str(path.resolve())
+
+
 def find_package(package: str, folder: Path) -> Path | None:
     """Return the folder of a package that a description in ``folder`` names; None if there is none."""
     return next((root for root in _roots(package, folder) if root.is_dir()), None)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...files.problems import listing
 from ..robot_description import SLIDE_UNITS, ActuatorProfile, MotorRating, Thruster, Transmission
-from .errors import Draft, Path, nearest, number, read, vector
+from .errors import Draft, Path, nearest, number, vector
 from .structure import check_axis
 
 LARGEST_CONDITION = 1e8
@@ -19,7 +19,7 @@ LARGEST_CONDITION = 1e8
 
 def check_actuation(draft: Draft) -> None:
     """Report transmissions that are singular and motors that cannot exist."""
-    transmission = read(Transmission, draft.data.get("transmission"))
+    transmission = draft.part(Transmission, "transmission")
     motors = transmission.motors if transmission else ()
     if transmission:
         _check_transmission(draft, transmission)
@@ -36,8 +36,8 @@ def check_actuation(draft: Draft) -> None:
             ("profile",), f"the robot has no actuator profile {chosen!r}", listing(list(profiles)),
             f"profile: {chosen}", f"profile: {right}" if right else "",
         )  # fmt: skip
-    for name, value in profiles.items():
-        profile = read(ActuatorProfile, value)
+    for name in profiles:
+        profile = draft.part(ActuatorProfile, "profiles", name)
         if profile is not None:
             slides = _sliding_motors(draft, transmission) if transmission else frozenset()
             _check_profile(draft, name, profile, motors, slides)
@@ -186,9 +186,9 @@ def _check_rating(
 def check_thrusters(draft: Draft) -> None:
     """Report thrusters on unknown links, without direction, or that give nothing."""
     links = draft.names("links")
-    for name, value in draft.entries("thrusters"):
+    for name, _ in draft.entries("thrusters"):
         path: Path = ("thrusters", name)
-        thruster, owner = read(Thruster, value), f"thruster {name}"
+        thruster, owner = draft.part(Thruster, "thrusters", name), f"thruster {name}"
         if thruster is None:
             continue
         if thruster.link not in links:

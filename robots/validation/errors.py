@@ -109,6 +109,8 @@ class Draft:
 
     def __init__(self, data: Mapping[str, Any]) -> None:
         self.data = data
+        self.whole: BaseModel | None = None
+        """The description, where all of it can be read."""
         self.errors: list[DescriptionError] = []
 
     def add(
@@ -129,11 +131,24 @@ class Draft:
 
     def elements(self, key: str, kind: type[ElementType]) -> list[tuple[int, ElementType]]:
         """Return the readable elements of the list under ``key``, each with its index."""
+        if self.whole is not None:
+            return list(enumerate(getattr(self.whole, key)))
         found = self.data.get(key)
         if not isinstance(found, Sequence) or isinstance(found, str):
             return []
-        elements = ((k, read(kind, element)) for k, element in enumerate(found))
+        elements = ((k, _read(kind, element)) for k, element in enumerate(found))
         return [(k, element) for k, element in elements if element is not None]
+
+    def part(
+        self, kind: type[ElementType], key: str, name: str | None = None
+    ) -> ElementType | None:
+        """Return what lies under ``key``, or under ``name`` in the mapping there; None where it cannot be read."""
+        if self.whole is not None:
+            found = getattr(self.whole, key)
+            part: ElementType | None = found if name is None else found[name]
+            return part
+        value = self.data.get(key)
+        return _read(kind, value if name is None else dict(self.entries(key))[name])
 
     def entries(self, key: str) -> Iterator[tuple[str, Any]]:
         """Yield the entries of the mapping under ``key`` whose keys are text."""
@@ -150,7 +165,7 @@ class Draft:
         return [name for name in named if isinstance(name, str)]
 
 
-def read(kind: type[ElementType], value: Any) -> ElementType | None:
+def _read(kind: type[ElementType], value: Any) -> ElementType | None:
     """Return the value as that part of a description; None where it cannot be read."""
     try:
         return kind.model_validate(value)

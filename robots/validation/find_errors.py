@@ -44,7 +44,7 @@ def find_errors(data: Any) -> tuple[DescriptionError, ...]:
 def check_types(draft: Draft, kind: type[BaseModel]) -> None:
     """Report every key that is unknown or missing and every value of a wrong type."""
     try:
-        kind.model_validate(draft.data)
+        draft.whole = kind.model_validate(draft.data)
     except ValidationError as error:
         for each in error.errors(include_url=False):
             _report(draft, kind, each)

@@ -14,7 +14,7 @@ from ...files.problems import listing
 from ..element import Vector3
 from ..robot_description import Appearance, Box, Joint, Link, Mesh
 from ..shapes import THINNEST, Hull, is_body
-from .errors import Draft, Path, nearest, number, read, vector
+from .errors import Draft, Path, nearest, number, vector
 
 RESERVED = {"links": ("world",), "joints": ("base",), "contacts": ("floor",)}
 """Names that the models keep for themselves."""
@@ -282,10 +282,10 @@ def _check_inertia(draft: Draft, path: Path, link: Link) -> None:
 def check_looks(draft: Draft) -> None:
     """Report looks of unknown links, and parts that would be nowhere or have no direction."""
     links = draft.names("links")
-    for name, value in draft.entries("looks"):
+    for name, _ in draft.entries("looks"):
         if name not in links:
             draft.unknown(("looks", name), "the link of a look", name, "link", links)
-        look = read(Appearance, value)
+        look = draft.part(Appearance, "looks", name)
         if not isinstance(look, Appearance):
             continue
         solid: Mapping[str, Sequence[Mesh | Box]] = {"meshes": look.meshes, "boxes": look.boxes}

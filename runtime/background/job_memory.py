@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..running.memory import nameless_memory
+from ..running.snapshot import nameless_memory
 
 Copies = list[tuple[memoryview, memoryview]]
 """Targets and sources, of equal sizes."""

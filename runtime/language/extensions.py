@@ -12,7 +12,6 @@ declaration says which function gives it, and ``provided`` imports it.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -106,6 +105,8 @@ def read_declaration(name: str, folder: Path, package: str) -> Extension:
     Raises:
         ExtensionError: it is no TOML, or has an unknown key or a value of another type.
     """
+    import tomllib
+
     file = folder / DECLARATION
     try:
         found = tomllib.loads(file.read_text(encoding="utf-8"))

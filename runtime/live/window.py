@@ -25,9 +25,10 @@ from numpy.typing import NDArray
 from ..language.layout import Layout
 from ..language.stages import CheckedGraph
 from ..running.lateness import BUCKETS, TickLateness, lateness_of
-from ..running.memory import BoundGraph, nameless_memory
+from ..running.memory import BoundGraph
 from ..running.run_result import RunResult
 from ..running.sink import Sink
+from ..running.snapshot import nameless_memory
 from ..running.ticker import Ticker
 from ..running.timing import STAMPED_TICKS
 

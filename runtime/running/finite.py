@@ -7,18 +7,17 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from math import isfinite
-from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...mathematics.arrays import Array, Indices
 from ...mathematics.compiling.kernel_call import KernelCall
 from ...mathematics.kernel import kernel
 from ..language.errors import AloftError
 from ..language.layout import Layout
+from .region import Region
 
 _PIECE = 8192
 """Elements in one product: fewer than make a BLAS library start threads."""
@@ -32,13 +31,6 @@ usual products are not subnormal, which would be slow."""
 warnings.filterwarnings(  # the check finds it itself; setting NumPy's state in each tick would take longer
     "ignore", "invalid value encountered in dot", RuntimeWarning, re.escape(__name__)
 )
-
-
-class Region(Protocol):
-    """A region of memory, as ``memory`` has it."""
-
-    layout: Layout
-    sections: Mapping[str, NDArray[Any]]
 
 
 class NotFiniteError(AloftError):

@@ -23,8 +23,9 @@ from ...processes.child_process import ChildProcess
 from ..language.extensions import is_own
 from ..language.stages import CheckedGraph
 from .failures import INSTALLED
-from .memory import BoundGraph, nameless_memory
+from .memory import BoundGraph
 from .sink import Sink
+from .snapshot import nameless_memory
 
 BEATS = 4
 """Beats in every limit of time."""

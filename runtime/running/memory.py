@@ -17,68 +17,17 @@ from ...mathematics.compiling.kernel_call import KernelCall, collect_calls
 from ...robots.description import RobotDescription
 from ..language.block import Block, Clock, Context
 from ..language.collector import collector_paused
-from ..language.errors import DeclarationError, RunError
-from ..language.layout import ALIGNMENT, LARGEST, Layout, PortLayout
-from ..language.signals import DTYPES, Signal
+from ..language.errors import DeclarationError
+from ..language.layout import Layout, PortLayout
+from ..language.signals import Signal
 from ..language.stages import BlockSpec, CheckedGraph
 from ..language.steps import bind_steps
 from .failures import blame
 from .finite import FiniteCheck
 from .kernel_checks import check_kernels
 from .live_parameters import LiveParameters
-from .snapshot import Snapshot as Snapshot  # noqa: PLC0414  also imported from here
-from .snapshot import nameless_memory as nameless_memory  # noqa: PLC0414
-
-
-class Region:
-    """One aligned buffer for a layout, with a flat array for each section; at first it is zero, and
-    quaternions are the identity."""
-
-    def __init__(self, layout: Layout) -> None:
-        self.layout = layout
-        raw = np.zeros(layout.size + ALIGNMENT, np.uint8)
-        start = -raw.ctypes.data % ALIGNMENT
-        self.buffer: NDArray[np.uint8] = raw[start : start + layout.size]
-        self.sections: Mapping[str, NDArray[Any]] = {
-            name: self.buffer[first : first + layout.lengths[name] * dtype.itemsize].view(dtype)
-            for name, dtype in DTYPES.items()
-            for first in (layout.offsets[name],)
-        }
-        for name in layout.quaternions:
-            self.field(name)[..., 3] = 1.0
-
-    def field(self, name: str, *, writable: bool = True) -> NDArray[Any]:
-        """Return the view of the slot ``block.port.field``. Raises ``KeyError``."""
-        slot = self.layout.slots[name]
-        flat = self.sections[slot.section][slot.start : slot.start + slot.size]
-        view = flat.reshape(slot.shape)
-        view.flags.writeable = writable
-        return view
-
-    def signal(
-        self, signal: type[Signal], port: str, *, writable: bool = True, source: str = ""
-    ) -> Signal:
-        """Bind the fields of ``signal`` to the slots of ``source`` (by default of ``port``)."""
-        start = source or port
-        return signal.bind(
-            {name: self.field(f"{start}.{name}", writable=writable) for name in signal.fields}
-        )
-
-
-def _allocate(layout: Layout, what: str) -> Region:
-    """Allocate the memory of a layout. Raises ``RunError`` if it needs more than a graph may
-    have."""
-    try:
-        if layout.size <= LARGEST:
-            return Region(layout)
-    except MemoryError:
-        pass
-    name = max(layout.slots, key=lambda name: layout.slots[name].size)
-    raise RunError(
-        f"the {what} of the graph need {layout.size / 1e9:.3g} GB of memory; the largest is {name} "
-        f"of shape {list(layout.slots[name].shape)}",
-        block=name.rpartition(".")[0].rpartition(".")[0],
-    )
+from .region import allocate
+from .snapshot import Snapshot
 
 
 class Memory:
@@ -117,9 +66,9 @@ class Memory:
                 for name, signal in inner.items():
                     if signal is not None:
                         own.append(PortLayout(f"{spec.path}.{name}", signal, sizes))
-        self.bus = _allocate(Layout.of([*outputs, *constants]), "signals")
-        self.state = _allocate(Layout.of(states), "states")
-        self.own = _allocate(Layout.of(own), "constants")
+        self.bus = allocate(Layout.of([*outputs, *constants]), "signals")
+        self.state = allocate(Layout.of(states), "states")
+        self.own = allocate(Layout.of(own), "constants")
         """Constants and scratch: they follow from parameters and inputs, so no snapshot has them."""
         for spec in specs:
             for name, port in spec.block_type.inputs.items():

@@ -25,10 +25,11 @@ from ..language.errors import AloftError
 from ..language.parameters import Parameters
 from ..language.registry import block_name
 from .failures import describe
-from .memory import BoundGraph, Snapshot
+from .memory import BoundGraph
 from .pacing import Paced
 from .sink import Note, Sink
 from .sinks import RunHash
+from .snapshot import Snapshot
 from .ticker import Ticker
 
 INTERVAL = 0.5

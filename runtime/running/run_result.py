@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from difflib import get_close_matches
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -79,6 +78,8 @@ class RunResult:
 
     def _repr_html_(self) -> str:
         """Outcome and metrics as a table, for notebooks."""
+        from html import escape
+
         rows = "".join(
             f"<tr><td>{escape(name)}</td><td>{escape(_shown(value))}</td></tr>"
             for name, value in self.metrics.items()

@@ -27,9 +27,9 @@ from ..language.signals import Signal
 from ..language.stages import CheckedGraph, ClockSpec
 from .executor import Executor
 from .life_cycle import LifeState
-from .memory import Snapshot
 from .run_result import RunResult
 from .sink import Sink
+from .snapshot import Snapshot
 
 Adjust = Callable[[Mapping[str, Block], Mapping[str, Any]], Adjustment]
 """Checks new values of live parameters of some blocks: ``loading.adjust``."""

@@ -17,7 +17,8 @@ from ..language.errors import BlockError
 from ..language.parameters import Parameters
 from ..language.requirements import unmet_requirements
 from ..language.stages import BlockSpec
-from ..running.memory import Memory, Snapshot
+from ..running.memory import Memory
+from ..running.snapshot import Snapshot
 
 B = TypeVar("B", bound=Block)
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import typer
 import yaml
 
 from aloft import load
-from aloft.cli.log_import import forces_of_feet, graph_of, guess, numbered
+from aloft.cli.log_import import forces_of_feet, graph_of, guess, import_log, numbered
 from aloft.cli.logged_joints import columns_of_joints
 from aloft.hal.log.log_file import read_log
 from aloft.lab.studies.icub_estimators import JOINTS, write_robot
@@ -123,6 +125,24 @@ def test_an_icubs_log_gets_all_that_its_estimator_needs(tmp_path: Path) -> None:
     result = load(tmp_path / "walk.yaml").run(log=False, run_hash=False)
     result.raise_if_failed()
     assert result.metrics["estimator_position_rms_m"] < 0.02, "nothing was written by hand"
+
+
+@pytest.mark.long
+@needs_icub
+@pytest.mark.parametrize("feet", ["balls", "soles"])
+def test_soles_need_not_be_level_as_the_description_stands(tmp_path: Path, feet: str) -> None:
+    """``aloft robot import`` guesses balls, on which the pose that it finds rolls."""
+    pytest.importorskip("h5py")
+    robot = write_robot(tmp_path)
+    written = robot.read_text()
+    if feet == "balls":
+        written = re.sub(r"points: \[\[.*\]\]", "radius: 0.02", written)
+        assert "points" not in written
+    rolled = "r_hip_roll: 0.368, r_hip_yaw: 0.351, r_hip_pitch: 0.723, r_knee: -1.31, r_ankle_roll: -0.097"
+    robot.write_text(f"{written}\nstanding: {{{rolled}}}\n")
+    said, played = imported(FOLDER / "icub" / "walking.mat", robot, tmp_path / "walk.yaml")
+    assert any("the feet stand still with these names" in note for note in said["notes"])
+    assert played["imu"]["sensor"] == "root_link_imu_acc"
 
 
 @pytest.mark.long
@@ -280,3 +300,14 @@ blocks:
         checked_file(file)
     messages = [problem.message for problem in caught.value.report.problems]
     assert "robot.contacts.closed[0] has no elements with this robot" in messages
+
+
+def test_a_robot_that_is_not_there_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "log.csv").write_text("t,q\n0,1\n1,2\n")
+    with pytest.raises(typer.Exit):
+        import_log(tmp_path / "log.csv", tmp_path / "robot.yaml", tmp_path / "graph.yaml")
+    said = " ".join(capsys.readouterr().err.split())
+    assert "error: --robot" in said and "no robot description at" in said
+    assert not (tmp_path / "graph.yaml").exists()

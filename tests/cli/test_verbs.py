@@ -266,14 +266,40 @@ atexit.register(lambda: print(len(searched), gc.get_freeze_count(), *sys.modules
     assert int(searches) < 10 and int(frozen) > 10_000
     tops = {name.partition(".")[0] for name in modules}
     assert tops & HEAVY == set()
-    # Neither the search through installed packages, nor what compiles kernels.
-    assert {"importlib.metadata", "aloft.mathematics.compiling.translate"} & {*modules} == set()
+    # Neither the search through installed packages, nor what compiles, links or loads kernels, nor what other graphs
+    # need: machines, a robot in XML, declarations of extensions, what a robot has learnt.
+    assert {
+        "importlib.metadata", "importlib.resources", "xml.etree.ElementTree", "tomllib", "socket", "pkgutil",
+        "aloft.mathematics.compiling.translate", "aloft.mathematics.compiling.machine_code",
+        "aloft.runtime.transports", "aloft.planner.library.learnt",
+    } & {*modules} == set()  # fmt: skip
     ours = [name for name in modules if name.startswith("aloft.")]
-    assert len(ours) < 250
+    assert len(ours) < 235
     assert {name for name in ours if name.startswith("aloft.cli.")} == {
-        "aloft.cli.app", "aloft.cli.check", "aloft.cli.shared", "aloft.cli.shared.dataclass_methods",
-        "aloft.cli.shared.help_texts", "aloft.cli.shared.options", "aloft.cli.shared.output", "aloft.cli.verbs",
+        "aloft.cli.app", "aloft.cli.check", "aloft.cli.shared", "aloft.cli.shared.help_texts",
+        "aloft.cli.shared.options", "aloft.cli.shared.output", "aloft.cli.shared.plain_console", "aloft.cli.verbs",
     }  # fmt: skip
+
+
+def test_an_unrecorded_run_imports_no_recorder(
+    start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("FORCE_COLOR", "TTY_COMPATIBLE"):  # by which Rich takes a pipe for a terminal
+        monkeypatch.delenv(name, raising=False)
+    # Nor links between processes, nor what checks a plan that has passed or makes a table that is kept.
+    graph, before = (
+        str(ROOT / "graphs" / "jump.yaml"),
+        "import atexit, sys\natexit.register(lambda: print(*sys.modules))\n",
+    )
+    arguments = ("run", graph, "--no-record", "--json", "--duration", "10 ms")
+    for _ in range(2):  # after the first, all is kept
+        output, errors = start(*arguments, before=before).communicate(timeout=240)
+    modules = {*output.splitlines()[-1].split()}
+    assert "aloft.runtime.running.executor" in modules, errors
+    assert {
+        "aloft.logs", "aloft.runtime.links", "aloft.runtime.transports", "aloft.planner.checking", "aloft.planner.models",
+        "aloft.planner.library.reference_table", "html", "concurrent.futures", "rerun", "rich",
+    } & modules == set()  # fmt: skip
 
 
 def test_a_bug_does_not_look_like_a_fall(

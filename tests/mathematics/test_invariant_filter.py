@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from aloft.mathematics import extended_pose, rotations
+from aloft.mathematics.arrays import Array1D, Array2D
 from aloft.mathematics.constants import GRAVITY
 from aloft.mathematics.inertial_filter import propagate
 from aloft.mathematics.invariant_filter import (
@@ -24,8 +25,11 @@ from aloft.mathematics.invariant_filter import (
     vector_deviation,
     world_definition_jacobian,
 )
+from aloft.mathematics.kernel import kernel
 from aloft.robots.contact_kinematics import ContactKinematics
 from aloft.robots.description import find_robot
+
+from ..compiled import run_compiled
 
 PERIOD, N = 0.002, 2
 SIZE = 9 + 3 * N
@@ -314,17 +318,26 @@ def test_a_single_point_shows_no_heading():
     assert not sensitivity[2].any()
 
 
+@kernel
+def measure_and_update(
+    covariance: Array2D, sensitivity: Array2D, noise: Array2D, residual: Array1D, seen: Array2D,
+    inverse: Array2D, scratch: Array2D, gain: Array2D, correction: Array1D, likelihood: Array1D,
+) -> None:  # fmt: skip
+    likelihood[0] = squared_distance(
+        covariance, sensitivity, noise, residual, seen, inverse, scratch
+    )
+    update_covariance(covariance, sensitivity, noise, residual, seen, inverse, gain, correction)
+
+
 def update(covariance, sensitivity, noise, residual):
     """Chi-squared, the new covariance, and the correction."""
     n = len(covariance)
-    covariance = covariance.copy()
-    seen, inverse, gain = np.empty((n, 3)), np.empty((3, 3)), np.empty((n, 3))
-    correction = np.empty(n)
-    likelihood = squared_distance(
-        covariance, sensitivity, noise, residual, seen, inverse, np.empty((3, 3))
-    )
-    update_covariance(covariance, sensitivity, noise, residual, seen, inverse, gain, correction)
-    return likelihood, covariance, correction
+    covariance, correction, likelihood = covariance.copy(), np.empty(n), np.empty(1)
+    run_compiled(
+        measure_and_update, covariance, sensitivity, noise, residual, np.empty((n, 3)),
+        np.empty((3, 3)), np.empty((3, 3)), np.empty((n, 3)), correction, likelihood,
+    )  # fmt: skip
+    return likelihood[0], covariance, correction
 
 
 def draw(seed, n=9, spread=0.0):

@@ -133,7 +133,8 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def digest(*folders: str) -> bytes:
     """As in a new process."""
-    code_digest.cache_clear()
+    module._folder_digest.cache_clear()
+    module._versions.cache_clear()
     return code_digest(*folders)
 
 
@@ -157,8 +158,14 @@ def test_other_folders_and_files_do_not(package: Path) -> None:
     assert digest("robots", "mathematics") != before
 
 
-def test_the_versions_of_libraries_are_part_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_versions_of_libraries_are_part_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     before = digest("mathematics")
-    monkeypatch.setattr(metadata, "version", lambda name: "0.0")
+    assert f"numpy-{metadata.version('numpy')}.dist-info" in module._versions().decode()
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "numpyro-0.0.dist-info").mkdir()
+    assert digest("mathematics") == before
+    (tmp_path / "numpy-0.0.dist-info").mkdir()
     assert digest("mathematics") != before
-    code_digest.cache_clear()
+    module._versions.cache_clear()

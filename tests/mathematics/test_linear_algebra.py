@@ -14,13 +14,17 @@ from aloft.mathematics.linear_algebra import (
     inverse,
     multiply_matrices,
     multiply_vector,
+    pairwise_sum,
     product,
     solve_damped,
+    solve_each_transposed,
+    solve_each_upper,
     solve_positive,
     solve_rows,
     solve_rows_transposed,
     solve_transposed,
     solve_upper,
+    weighted_sum,
 )
 
 
@@ -35,6 +39,23 @@ def test_products_are_numpys() -> None:
     product = np.empty((3, 2))
     multiply_matrices(a, b, product)
     np.testing.assert_allclose(product, a @ b, rtol=1e-14)
+
+
+def test_a_weighted_sum_has_the_bits_of_numpys_along_the_first_axis() -> None:
+    rng = np.random.default_rng(0)
+    for n, m in ((1, 3), (7, 50), (60, 4), (300, 11)):
+        weights, rows, out = rng.normal(size=n), rng.normal(size=(n, m)), np.ones(m)
+        weights[rng.random(n) < 0.3] = 0.0
+        weighted_sum(weights, rows, out)
+        used = np.flatnonzero(weights)
+        assert (out == (weights[used, None] * rows[used]).sum(axis=0)).all()
+
+
+def test_a_pairwise_sum_has_the_bits_of_numpys_along_memory() -> None:
+    rng = np.random.default_rng(1)
+    for count in range(129):
+        values = rng.normal(size=count) * 10.0 ** rng.integers(-3, 3, size=count)
+        assert pairwise_sum(values) == values.sum()
 
 
 def positive(seed=0, n=5):
@@ -60,6 +81,22 @@ def test_the_factor_and_its_systems():
     solve_rows_transposed(factor, 3, x)
     np.testing.assert_allclose(upper.T @ x[:, :3], rows[:, :3], rtol=1e-11, atol=1e-12)
     assert (x[:, 3] == rows[:, 3]).all()
+
+
+@pytest.mark.parametrize("count", [0, 1, 6])
+def test_systems_with_one_factor_have_the_bits_of_each_alone(count):
+    factor = positive(n=7)
+    assert factorise(factor, 0.0)
+    right = np.random.default_rng(2).standard_normal((count, 7))
+    for together, alone in (
+        (solve_each_transposed, solve_transposed),
+        (solve_each_upper, solve_upper),
+    ):
+        found, expected = right.copy(), right.copy()
+        together(factor, found)
+        for row in expected:
+            alone(factor, row)
+        np.testing.assert_array_equal(found, expected)
 
 
 @pytest.mark.parametrize("spoil", [-1.0, np.nan, np.inf])

@@ -5,9 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests.planner.one_interval import integrate, joint_motion
 
 from aloft.blocks.jumping.squat_jump import SquatJumpParameters, plan_squat_jump
-from aloft.planner.models.exact_dynamics import ExactDynamics, joint_motion
+from aloft.planner.models.exact_dynamics import ExactDynamics
 from aloft.planner.task.phase import Phase
 from aloft.planner.task.plan import PlannedJump
 from aloft.planner.task.task import make_task
@@ -102,8 +103,8 @@ def with_forces(plan: PlannedJump, dynamics: ExactDynamics) -> PlannedJump:
             )
         joints = joint_motion(plan.position, plan.velocity, plan.time, k)
         if h > 0.0:
-            states = dynamics.integrate(
-                plan.position[k], plan.velocity[k], joints, force[k], 0.5 * h
+            states = integrate(
+                dynamics, plan.position[k], plan.velocity[k], joints, force[k], 0.5 * h
             )
             _, q, v = states[0]
             torque[k] = dynamics.joint_torque(q, v, joints.at(0.5 * h)[2], force[k])

@@ -9,7 +9,7 @@ from tests.robots.limbed_robots import CORNERS, HUMANOID, STANDING, TWO, Y, legg
 
 from aloft.planner.checking.evidence import arm_clearance_deficit
 from aloft.planner.checking.validity import check_plan
-from aloft.planner.models.link_shapes import arms
+from aloft.planner.models.link_shapes import arms, moving_shapes
 from aloft.planner.problem.arm_range import arm_ranges
 from aloft.planner.solving.solve import solve_jump
 from aloft.planner.task.files import PlanError
@@ -103,7 +103,7 @@ def test_every_pose_in_the_range_is_clear_and_a_wider_range_is_not() -> None:
         joints = np.tile(freed.standing_position, (2, 1))
         joints[1, ARM] = angle
         poses = link_poses(freed, np.zeros((2, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)), joints)
-        found = arm_clearance_deficit(freed, poses, 0.02)
+        found = arm_clearance_deficit(freed, moving_shapes(freed, poses), 0.02)
         assert found is not None and found[1] == "left_arm_link at base"
         return float(found[0][1])
 

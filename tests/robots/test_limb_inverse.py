@@ -10,6 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from aloft.mathematics.arrays import Array1D, Array2D
+from aloft.mathematics.kernel import kernel
 from aloft.robots import five_joint_leg
 from aloft.robots.description import find_robot
 from aloft.robots.limb import FootKind, aim, foot_error, read_limb, set_limb_pose, turning
@@ -21,6 +23,7 @@ from aloft.robots.limb_inverse import (
     reach,
 )
 
+from ..compiled import run_compiled
 from .limbed_robots import LIGHT_QUADRUPED, SEVEN_JOINTS, humanoid, quadruped, slider
 
 BRUCE = find_robot("bruce")
@@ -77,21 +80,33 @@ def test_every_place_that_can_be_reached_is_found(name):
     assert found == count
 
 
+@kernel
+def follow(
+    links: Array2D, tip: Array1D, limits: Array2D, weights: Array1D, path: Array2D,
+    anchors: Array2D, target: Array2D, work: Array2D, angles: Array1D, squares: Array1D,
+    found: Array2D,
+) -> None:  # fmt: skip
+    for k in range(path.shape[0]):
+        set_limb_pose(links, tip, path[k], anchors, target)
+        squares[k] = approach(links, tip, limits, target, weights, 8, work, angles)
+        found[k] = angles
+
+
 @kinds
 def test_a_target_that_moves_is_followed_in_a_few_steps(name):
     robot, foot = LIMBS[name]
     limb = read_limb(robot, foot)
     n = len(limb.joints)
     middle = robot.standing_position[list(limb.joints)]
-    out, work, last = middle.copy(), limb_scratch(n), None
-    for tick in range(300):
-        angles = middle + 0.25 * np.sin(9.0 * 0.002 * tick + np.arange(n))
-        target = pose_of(limb, np.clip(angles, limb.limits[:, 0], limb.limits[:, 1]))
-        square = approach(limb.links, limb.tip, limb.limits, target, WEIGHTS, 8, work, out)
-        assert square <= REACHED
-        if last is not None:
-            assert np.abs(out - last).max() < 0.1
-        last = out.copy()
+    waves = np.sin(9.0 * 0.002 * np.arange(300)[:, None] + np.arange(n))
+    path = np.clip(middle + 0.25 * waves, limb.limits[:, 0], limb.limits[:, 1])
+    squares, found = np.full(300, np.inf), np.zeros((300, n))
+    run_compiled(
+        follow, limb.links, limb.tip, limb.limits, WEIGHTS, path, np.zeros((n, 6)),
+        np.zeros((4, 3)), limb_scratch(n), middle.copy(), squares, found,
+    )  # fmt: skip
+    assert squares.max() <= REACHED
+    assert np.abs(np.diff(found, axis=0)).max() < 0.1
 
 
 @settings(deadline=None)
@@ -130,6 +145,24 @@ def _rows(limb, angles):
     return np.array(columns).T
 
 
+@kernel
+def reach_it(
+    links: Array2D, tip: Array1D, limits: Array2D, target: Array2D, weights: Array1D,
+    starts: Array2D, tries: int, steps: int, work: Array2D, angles: Array1D, square: Array1D,
+) -> None:  # fmt: skip
+    square[0] = reach(links, tip, limits, target, weights, starts, tries, steps, work, angles)
+
+
+@kernel
+def errors_at(
+    links: Array2D, tip: Array1D, target: Array2D, weights: Array1D, angles: Array2D,
+    anchors: Array2D, pose: Array2D, scratch: Array1D, errors: Array1D,
+) -> None:  # fmt: skip
+    for k in range(errors.shape[0]):
+        set_limb_pose(links, tip, angles[k], anchors, pose)
+        errors[k] = math.sqrt(foot_error(tip, pose, target, weights, scratch))
+
+
 @kinds
 def test_out_of_reach_the_nearest_place_within_the_limits(name):
     """No joint position close to the answer brings the foot nearer."""
@@ -142,12 +175,20 @@ def test_out_of_reach_the_nearest_place_within_the_limits(name):
         target = pose_of(limb, middle)
         target[0] += random.normal(0.0, 1.0, 3)
         target[0] *= 1.5 / np.linalg.norm(target[0])
-        square = reach(limb.links, limb.tip, limb.limits, target, WEIGHTS, starts, 3, 60, work, out)
-        assert square > REACHED
-        assert error(limb, pose_of(limb, out), target) == pytest.approx(math.sqrt(square))
-        for _ in range(60):
-            near = np.clip(out + random.normal(0.0, 0.01, n), limb.limits[:, 0], limb.limits[:, 1])
-            assert error(limb, pose_of(limb, near), target) > math.sqrt(square) - 1e-4
+        square, errors = np.zeros(1), np.zeros(60)
+        run_compiled(
+            reach_it, limb.links, limb.tip, limb.limits, target, WEIGHTS, starts, 3, 60, work, out,
+            square,
+        )  # fmt: skip
+        assert square[0] > REACHED
+        assert error(limb, pose_of(limb, out), target) == pytest.approx(math.sqrt(square[0]))
+        near = out + random.normal(0.0, 0.01, (len(errors), n))
+        run_compiled(
+            errors_at, limb.links, limb.tip, target, WEIGHTS,
+            np.clip(near, limb.limits[:, 0], limb.limits[:, 1]), np.zeros((n, 6)),
+            np.zeros((4, 3)), np.zeros(6), errors,
+        )  # fmt: skip
+        assert errors.min() > math.sqrt(square[0]) - 1e-4
 
 
 @settings(deadline=None, max_examples=60)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import pkgutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -295,8 +294,7 @@ class ChosenTask:
 def own_tasks() -> Mapping[str, type[Task]]:
     """Return the tasks that a graph may choose by name: all that the modules of this package define."""
     package = __name__.rpartition(".")[0]
-    folder = str(Path(__file__).parent)
-    names = sorted(each.name for each in pkgutil.iter_modules([folder]))
+    names = sorted(path.stem for path in Path(__file__).parent.glob("[!_]*.py"))
     modules = [import_module(f"{package}.{name}") for name in names if name != "task"]
     return {
         kind.__name__: kind

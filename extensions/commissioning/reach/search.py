@@ -16,10 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from ....planner.checking.plan_tests import active_limits
-from ....planner.checking.validity import InvalidPlanError, failure_text
+from ....planner.checking.validity import failure_text
 from ....planner.library.library import PlanLibrary, solve_and_check
 from ....planner.solving.solver_process import cpu_time
 from ....planner.task.files import JumpTaskError, PlanError
+from ....planner.task.plan import InvalidPlanError
 from ....planner.task.task import JumpTask
 from ....robots.description import find_robot
 from ....robots.robot_description import RobotDescription

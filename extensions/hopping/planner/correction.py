@@ -19,7 +19,7 @@ from ....mathematics.banded_system import hold_violated, keep_bounds, smallest_c
 from ....mathematics.compiling.compile_calls import compile_calls
 from ....mathematics.compiling.kernel_call import KernelCall, aligned_zeros
 from ....planner.problem.problem import FullProblem
-from ....planner.solving.constraint_values import ConstraintValues
+from ....planner.problem.program_values import ProgramValues
 from ....planner.solving.solver import VIOLATION
 
 STEPS = 8
@@ -59,7 +59,7 @@ class Corrector:
     def __init__(self, problem: FullProblem) -> None:
         assembly = problem.assembly
         rows, variables = assembly.constraints, assembly.variables
-        self._constraints, self._squares = ConstraintValues(assembly), squares_of_changes(problem)
+        self._constraints, self._squares = ProgramValues(assembly), squares_of_changes(problem)
         self._variables, self._lower, self._upper, self._inverse, self._step = np.zeros(
             (5, variables)
         )
@@ -88,11 +88,10 @@ class Corrector:
         self._lower[:], self._upper[:] = problem.lower, problem.upper
         self._row_lower[:], self._row_upper[:] = problem.row_lower, problem.row_upper
         self._held[:] = problem.row_lower == problem.row_upper
-        self._constraints.set_parameters(problem.parameters)
         violation = np.inf
         for steps in range(STEPS + 1):
             self._keep_bounds.run()
-            self._constraints.evaluate(self._variables)
+            self._constraints.evaluate(self._variables, problem.parameters)
             self._hold_violated.run()
             before, violation = violation, float(self._violation[0])
             if not violation > ENOUGH or violation > LOST or steps == STEPS:

@@ -19,7 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....mathematics.arrays import Array
-from ....mathematics.linear_algebra import product, solve_positive
+from ....mathematics.compiling.compile_calls import compile_calls
+from ....mathematics.compiling.kernel_call import KernelCall
+from ....mathematics.linear_algebra import product, solve_positive, weighted_sum
 from ....planner.task.files import write_whole
 from ....planner.task.phase import Phase
 from ....planner.task.plan import ARRAYS, PlanFileError, PlannedJump
@@ -91,14 +93,31 @@ class PlanSamples:
         """Return a motion near the plan of a request. It obeys no law of motion exactly."""
         return self._make(wanted, self.weights(wanted))
 
+    @cached_property
+    def _mean(self) -> tuple[KernelCall, Array, Array]:
+        """The call that sums all arrays and the flights, with the weights that it takes and what it gives."""
+        parts = [array for name, array in self.arrays.items() if name not in KEPT_EXACTLY]
+        side_by_side = [part.reshape(len(part), -1) for part in (*parts, self.flights)]
+        rows = np.concatenate(side_by_side, axis=1, dtype=np.float64)
+        weights, found = np.zeros(len(rows)), np.zeros(rows.shape[1])
+        call = KernelCall(weighted_sum, weights, rows, found)
+        compile_calls([call])
+        return call, weights, found
+
     def _make(self, wanted: HopRequest, weights: Array) -> PlannedJump:
-        values: dict[str, Any] = {
-            name: array[0] if name in KEPT_EXACTLY else _mean(weights, array)
-            for name, array in self.arrays.items()
-        }
+        call, given, found = self._mean
+        given[:] = weights
+        call.run()
+        mean, values, start = found.copy(), dict[str, Any](), 0
+        for name, array in self.arrays.items():
+            if name in KEPT_EXACTLY:
+                values[name] = array[0]
+                continue
+            values[name] = mean[start : start + array[0].size].reshape(array.shape[1:])
+            start += array[0].size
         turn = values["position"][:, 3:7]
         turn /= np.linalg.norm(turn, axis=1)[:, None]
-        lift_off, touchdown = _mean(weights, self.flights).tolist()
+        lift_off, touchdown = mean[start:].tolist()
         return PlannedJump(
             task=task_of(wanted, self.robot, self.reach.rise),
             lift_off_time=lift_off,
@@ -113,13 +132,6 @@ def differences(requests: Array, wanted: HopRequest) -> Array:
     # A difference of height that no plan is made for is no distance between plans on level ground.
     other = np.array(wanted if not wanted.level else (*wanted[:3], 0.0))
     return np.asarray((requests - other) / SCALES)
-
-
-def _mean(weights: Array, rows: NDArray[np.generic]) -> Array:
-    """Return the weighted sum over the first axis."""
-    used = np.flatnonzero(weights)
-    flat = rows.reshape(len(rows), -1)[used].astype(np.float64)
-    return np.asarray((weights[used, None] * flat).sum(axis=0).reshape(rows.shape[1:]))
 
 
 def samples_of(

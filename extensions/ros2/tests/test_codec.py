@@ -96,6 +96,18 @@ def test_what_is_written_is_read(name: str) -> None:
         np.testing.assert_array_equal(found[leaf.name], given_[leaf.name].astype(rounded))
 
 
+def test_a_byte_is_a_number_from_0_to_255() -> None:
+    codec = Codec(MessageType("std_msgs/msg/Byte", "jazzy", {}), {}, {})
+    for value in (0, 127, 128, 200, 255):
+        data = codec.write({"data": np.array(value)}, 0)
+        assert data[4] == value
+        assert codec.read(data)["data"] == value
+    many = Codec(MessageType("std_msgs/msg/ByteMultiArray", "jazzy", {"data": 3}), {}, {})
+    given_ = {leaf.name: np.zeros(many.shapes[leaf.name], leaf.dtype) for leaf in many.type.leaves}
+    given_["data"] = np.array([127, 128, 255])
+    assert many.read(many.write(given_, 0))["data"].tolist() == [127, 128, 255]
+
+
 def test_every_type_that_has_numbers_is_written_and_read() -> None:
     count = 0
     for name in type_store("jazzy").fielddefs:

@@ -21,11 +21,12 @@ import numpy as np
 
 from ....extensions.commissioning.reach.search import JumpGraph
 from ....mathematics.constants import GRAVITY
-from ....planner.checking.validity import InvalidPlanError, failure_text
+from ....planner.checking.validity import failure_text
 from ....planner.library.library import PlanLibrary, shipped_folder, solve_and_check
 from ....planner.solving.solve import make_problem
 from ....planner.solving.solver_process import cpu_time
 from ....planner.task.files import JumpTaskError, PlanError
+from ....planner.task.plan import InvalidPlanError
 from ....planner.task.task import JumpTask
 from ....robots.description import RobotDescription, find_robot
 from ....studies.batch.jobs import job_results

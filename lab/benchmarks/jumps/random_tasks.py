@@ -30,10 +30,11 @@ from typing import Any
 
 import numpy as np
 
-from ....planner.checking.validity import InvalidPlanError, failure_text
+from ....planner.checking.validity import failure_text
 from ....planner.library.library import solve_and_check
 from ....planner.solving.solver_process import cpu_time
 from ....planner.task.files import PlanError
+from ....planner.task.plan import InvalidPlanError
 from ....planner.task.task import JumpTask, make_task
 from ....robots.description import RobotDescription, find_robot
 from ..rows import Row

@@ -14,6 +14,7 @@ import numpy as np
 from ....files.pip_line import pip_line
 from ....mathematics.arrays import Array
 from ....planner.problem.program import SimpleProblem
+from ....planner.problem.program_functions import program_functions
 from ....planner.solving.paper_plan import LIMIT, paper_problem
 from ....planner.solving.solver import DUAL_TOLERANCE, VIOLATION, Solution, solve, violation_of
 from ....planner.solving.solver_process import cpu_time, without_output
@@ -88,7 +89,7 @@ def solve_by_sqp(problem: SimpleProblem, guess: Array, solver: str = "osqp") -> 
     """Solve a problem by CasADi's sequential quadratic programming, with a solver of quadratic programs that it has."""
     import casadi as ca
 
-    functions = problem.assembly.functions()
+    functions = program_functions(problem.assembly)
     x, p = (ca.MX.sym(name, functions[name].numel()) for name in ("x", "p"))
     factor, multipliers = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", problem.assembly.constraints)
     cost, slope = functions["grad_f"](x, p)

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ....planner.checking.validity import InvalidPlanError, check_plan, failure_text
+from ....planner.checking.validity import check_plan, failure_text
 from ....planner.library.library import PlanLibrary, shipped_folder, solve_and_check
 from ....planner.problem.guess import ballistic_guess
 from ....planner.problem.problem import FullProblem
@@ -28,6 +28,7 @@ from ....planner.solving.solve import make_problem, solve_jump
 from ....planner.solving.solver import Solution, solve
 from ....planner.solving.solver_process import cpu_time
 from ....planner.task.files import PlanError
+from ....planner.task.plan import InvalidPlanError
 from ....planner.task.read_task import read_task
 from ....planner.task.task import JumpTask, make_task
 from ....robots.description import find_robot

@@ -9,7 +9,6 @@ too, so their share can be taken off.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 
 from ....mathematics.arrays import Array
 from ....planner.problem.assembly import Assembly, NonlinearProgram
+from ....planner.problem.program_functions import program_functions
 from ....planner.solving.solver import violation_of
 
 OPTIONS: dict[str, float | int] = {
@@ -212,7 +212,7 @@ class SnoptProgram:
             return SnoptResult(guess, np.nan, np.inf, 34, cpu, self.callback_cpu)
         cpu = time.process_time() - started
         values = np.array(result.GetSolution(self.x))
-        functions: dict[str, Callable[..., Any]] = self.problem.assembly.functions()
+        functions = program_functions(self.problem.assembly)
         violation, _ = violation_of(self.problem, values, functions["nlp_g"])
         cost = float(result.get_optimal_cost())
         info = int(result.get_solver_details().info)

@@ -338,7 +338,7 @@ def _tsid_controller(jump: RecordedJump, tsid: ModuleType) -> RecordedController
     controller = RecordedController(jump, fuse=False, instead={"wbc": TsidController})
     block, dynamics = controller.bound.blocks["wbc"], controller.bound.blocks["dynamics"]
     assert isinstance(block, TsidController) and isinstance(dynamics, Dynamics)
-    block.use(TsidProgram(tsid, block, dynamics.base.orientation))
+    block.use(TsidProgram(tsid, block, dynamics))
     return controller
 
 

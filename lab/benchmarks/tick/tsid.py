@@ -83,7 +83,7 @@ class TsidProgram:
     Args:
         tsid: the module.
         block: the controller.
-        orientation: the base's quaternion x, y, z, w, (4,).
+        dynamics: the block whose state the terms are of; that of the controller's own joints may be earlier.
         exact: weigh the base's acceleration too.
         mass, com_offset: as in ``MassEstimate``; by default the description's.
     """
@@ -92,7 +92,7 @@ class TsidProgram:
         self,
         tsid: ModuleType,
         block: WholeBodyController,
-        orientation: Array,
+        dynamics: Dynamics,
         *,
         exact: bool = False,
         mass: float = 0.0,
@@ -101,7 +101,7 @@ class TsidProgram:
         import pinocchio as pin
 
         self._tsid, self._pin, self._block, self._exact = tsid, pin, block, exact
-        self._orientation = orientation
+        self._state = dynamics
         built = build_pinocchio_model(block.robot)
         model, self.coupling = built.model, built.rotor_coupling
         factor = mass / block.robot.total_mass if mass > 0.0 else 1.0
@@ -128,8 +128,8 @@ class TsidProgram:
 
     def solve(self) -> bool:
         """Write torques and accelerations of the present state; returns whether it was solved."""
-        block, q, v = self._block, self._q, self._v
-        q[:3], q[3:7], q[7:] = block.terms.base_position, self._orientation, block.joints.position
+        block, base, q, v = self._block, self._state.base, self._q, self._v
+        q[:3], q[3:7], q[7:] = base.position, base.orientation, self._state.joints.position
         v[:] = block.terms.velocity
         key = self.kind, block.phase.stance.tobytes()
         if key not in self._formulations:
@@ -302,6 +302,8 @@ class _Formulation:
         point.setKp(np.zeros(3))
         point.setKd(np.full(3, damping))
         point.useLocalFrame(False)
+        # By itself TSID weighs the force along the normal by a millionth of that along the ground.
+        point.setRegularizationTaskWeightVector(np.ones(3))
         self.program.addRigidContact(point, force_weight, weight, True)
         self._kept.append(point)
 
@@ -388,10 +390,8 @@ class TsidController(WholeBodyController):
 
 EVERY = 40
 """One in so many ticks is compared."""
-TORQUE_ERROR = 1e-2
-"""Largest accepted difference of the torques [N m]: TSID's solver adds 1e-8 to the diagonal of the
-Hessian, a ten-thousandth of the weight of forces, which alone decides between forces that do not
-move the base."""
+TORQUE_ERROR = 1e-5
+"""Largest accepted difference of the torques [N m]."""
 
 
 class TsidCheck:
@@ -399,8 +399,7 @@ class TsidCheck:
 
     For that TSID's model gets the mass and the centre of mass of the moment, and a weight of the base's
     acceleration; the own method's model loses the inertia of coupled rotors, and its limits on torque. What is
-    left of the differences is one weight for each task, so the thrust is left out, and states in which
-    friction binds a point: there the torques differ by more (0.09 N m at the end of a squat), which is not explained.
+    left of the differences is one weight for each task, so the thrust is left out.
 
     Attributes:
         errors: the largest difference of a torque in every state that was compared [N m].
@@ -445,7 +444,7 @@ class TsidCheck:
             return
         described = block.robot.total_mass
         program = TsidProgram(
-            self._tsid, block, self._dynamics.base.orientation, exact=True,
+            self._tsid, block, self._dynamics, exact=True,
             mass=round(float(weighed.mass) / described / LEAST_SCALE) * LEAST_SCALE * described,
             com_offset=np.rint(weighed.com_offset / LEAST_OFFSET) * LEAST_OFFSET,
         )  # fmt: skip
@@ -456,9 +455,6 @@ class TsidCheck:
             call.run()
         if int(self._found.code[0]) != SOLVED or not program.solve():
             raise AssertionError(f"tick {tick}: TSID or the own method found no solution")
-        force = self._found.force
-        if (np.abs(force[:, :2]).max(axis=1) > 0.999 * block.params.friction * force[:, 2]).any():
-            return
         apart = float(np.abs(program.torque - self._found.torque).max())
         if apart > TORQUE_ERROR:
             raise AssertionError(f"tick {tick}: TSID's torque is {apart:.2g} N m from the own one")

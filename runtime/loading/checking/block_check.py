@@ -125,7 +125,10 @@ def lacks_robot(draft: BlockDraft, settings: Settings) -> bool:
 def check_fit(draft: BlockDraft, settings: Settings, problems: Problems) -> None:
     """Report every unmet requirement of one block, whose parameters have been checked."""
     assert draft.block_type is not None and draft.params is not None
-    flat = draft.flat
+    flat, block_type = draft.flat, draft.block_type
+    asks = block_type.requires.__func__ is not Block.requires.__func__  # type: ignore[attr-defined]  # a class method
+    if not asks and not block_type.needs and settings.robot is None:
+        return  # as most general blocks in a graph without a robot
     context = Context(
         path=flat.path,
         clock=Clock(1.0 / (settings.base_rate or 1.0)),
@@ -138,7 +141,7 @@ def check_fit(draft: BlockDraft, settings: Settings, problems: Problems) -> None
         graph_folder=settings.folder,
         duration=None if settings.ticks is None else settings.ticks / (settings.base_rate or 1.0),
     )
-    for requirement in unmet_requirements(draft.block_type, draft.params, context):
+    for requirement in unmet_requirements(block_type, draft.params, context):
         report_requirement(draft, requirement, problems)
 
 

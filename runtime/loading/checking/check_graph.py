@@ -88,13 +88,18 @@ class _Drafts:
     def all(self) -> dict[str, BlockDraft]:
         """Return the drafts by path, in the order of the graph."""
         self._widths.find()
-        return {path: self._draft_of(flat) for path, flat in self._blocks.items()}
+        made = {path: self._draft_of(flat) for path, flat in self._blocks.items()}
+        del (
+            self._widths
+        )  # each holds the other, so that nothing of a load would be freed at its end
+        return made
 
     def _type_of(self, flat: FlatBlock) -> type[Block] | None:
         """Return the class of a block; what is wrong with it is reported once."""
         key = flat.use, flat.folder
-        if self._classes.get(key) is not None:
-            return self._classes[key]
+        known = self._classes.get(key)
+        if known is not None:
+            return known
         mine = (flat.path, flat.folder)  # a class that is not found is a problem of every block
         if mine not in self._classes:
             found = _find(flat, self._graph, self._problems) if flat.use else None

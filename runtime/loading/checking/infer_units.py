@@ -207,13 +207,15 @@ def unchecked_wires(drafts: Mapping[str, BlockDraft]) -> Iterator[str]:
 def questions(drafts: Mapping[str, BlockDraft]) -> Iterator[str]:
     """Yield a text for every input that joins unlike units where its block takes them for one."""
     for path, draft in drafts.items():
-        quantities = {
-            f"{name}.{field_name}": arrives
-            for name, port in draft.inputs.items()
-            for field_name in port.signal.fields
+        arriving = [
+            (name, field_name, arrives)
+            for name in draft.flat.wires
+            if name in draft.inputs
+            for field_name in draft.inputs[name].signal.fields
             if (arrives := quantity_at_input(drafts, draft, name, field_name)) is not None
-        }
-        if any(quantity.elements for quantity in quantities.values()):
+        ]
+        if any(quantity.elements for _, _, quantity in arriving):
+            quantities = {f"{name}.{field_name}": found for name, field_name, found in arriving}
             inputs = InputQuantities(quantities)
             inferred_outputs(draft, inputs)
             for name, fix in inputs.questions:

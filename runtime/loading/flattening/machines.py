@@ -17,7 +17,6 @@ from ....files.problems import Code, Problems, listing, nearest
 from ...language.flat_graph import FlatBlock, FlatGraph
 from ...language.signal_error import FOLDER
 from ...language.stages import BlockSpec, CheckedGraph, MachineSpec
-from ...transports.registry import EXAMPLE, endpoint_problem, transport_type
 from .subgraphs import Instance
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*$")
@@ -59,6 +58,10 @@ def placed(
 
 def read_machines(graph: FlatGraph, problems: Problems) -> tuple[MachineSpec, ...]:
     """Read the machines of a graph; also check that every block is placed on one of them."""
+    if not graph.machines and all(block.machine is None for block in graph.blocks):
+        return ()
+    from ...transports.registry import EXAMPLE, transport_type  # most graphs run on one machine
+
     machines: list[MachineSpec] = []
     for entry in graph.machines or ():
         machine = _read_machine(entry, problems)
@@ -154,6 +157,8 @@ def _read_machine(entry: Entry, problems: Problems) -> MachineSpec | None:
             found=entry.key,
         )
         return None
+    from ...transports.registry import EXAMPLE, endpoint_problem
+
     text = entry.value.value if isinstance(entry.value, ScalarNode) else None
     reason = endpoint_problem(text) if isinstance(text, str) else "it is no text"
     if reason:

@@ -21,10 +21,12 @@ from aloft.runtime.language.errors import BlockError
 from aloft.runtime.loading import LoadError, checked_file
 from aloft.runtime.testing import BlockBench
 
+from ...compiled import Sight
 from ...turns import quaternion_of, turn_in_body
 
 ROBOT = find_robot("bruce")
 SEEN = ContactKinematics(ROBOT)
+SIGHT = Sight(SEEN, 10)
 PERIOD = 0.002
 NONE = np.zeros(10)
 
@@ -53,11 +55,11 @@ class OnFlatFeet:
 
     def pose(self, time):
         """Orientation and position of the base [m]."""
-        SEEN.evaluate(quaternion_of(np.zeros(3)), np.zeros(3), self.joints(time), NONE)
+        SIGHT.see(quaternion_of(np.zeros(3)), self.joints(time))
         pitch = math.atan2(SEEN.forward[2], SEEN.forward[0])
         orientation, rotation = quaternion_of([0.0, pitch, 0.0]), np.empty((3, 3))
         rotations.to_matrix(orientation, rotation)
-        SEEN.evaluate(orientation, np.zeros(3), self.joints(time), NONE)
+        SIGHT.see(orientation, self.joints(time))
         position = -(SEEN.soles @ rotation.T).mean(axis=0)
         position[2] = -(SEEN.points @ rotation.T)[:, 2].mean()
         return orientation, position
@@ -228,7 +230,7 @@ def test_a_flight_is_an_integration_of_the_imu():
 def test_it_is_as_wrong_as_it_says():
     """Normalised estimation error squared of 12 runs whose errors are drawn as the filter assumes,
     within the chi-squared distribution's 99.9 % from above; and not idly pessimistic."""
-    from scipy.stats import chi2  # an import of a second
+    from scipy.special import gammaincinv  # a hundredth of the import of scipy.stats
 
     total, late = 0.0, 9
     for seed in range(12):
@@ -247,7 +249,7 @@ def test_it_is_as_wrong_as_it_says():
         Disturbed(run.bench.block, disturb)
         error = run.to(0.6).error()
         total += error @ np.linalg.solve(run.covariance()[:late, :late], error)
-    assert total < chi2.ppf(0.999, 12 * late)
+    assert total < 2.0 * gammaincinv(0.5 * 12 * late, 0.999)  # of chi-squared
     assert total > 0.4 * 12 * late
 
 

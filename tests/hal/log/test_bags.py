@@ -72,6 +72,27 @@ def test_a_bag_has_a_column_for_each_field_and_the_clock_of_its_headers(bag):
     assert log.array("joint_states.position").values.shape == (COUNT, len(JOINTS))
 
 
+def test_bytes_of_a_bag_are_from_0_to_255(tmp_path):
+    numbers = [0, 127, 128, 200, 255]
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        kinds = {
+            each: f"std_msgs/msg/{each}" for each in ("Byte", "Char", "Int8", "ByteMultiArray")
+        }
+        topics = {
+            each: writer.add_connection(f"/{each}", kinds[each], typestore=STORE) for each in kinds
+        }
+        for k, number in enumerate(numbers):
+            for each in ("Byte", "Char", "Int8"):
+                writer.write(topics[each], k, bytes([0, 1, 0, 0, number]))
+            many = bytes([0, 1, 0, 0, *(0,) * 8, 2, 0, 0, 0, number, 255])
+            writer.write(topics["ByteMultiArray"], k, many)
+    log = read_log(tmp_path / "bag")
+    for topic in ("Byte", "Char"):
+        assert log.array(f"{topic}.data").values[:, 0].tolist() == numbers
+    assert log.array("Int8.data").values[:, 0].tolist() == [0, 127, -128, -56, -1]
+    assert log.array("ByteMultiArray.data").values.tolist() == [[each, 255] for each in numbers]
+
+
 def test_a_bag_plays_the_robot(bag):
     result = aloft.load({
         "rate": "100 Hz", "robot": "bruce",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ FOUR = np.stack([np.sin(TIMES), 0 * TIMES, 0 * TIMES, np.cos(TIMES)], axis=1)
 
 
 def log_of(units=None, **arrays):
-    log = LogFile("log.npz")  # type: ignore[arg-type]
+    log = LogFile(Path("log.npz"))
     for name, values in {"t": TIMES, "gyro": GYRO, "force": REST, **arrays}.items():
         log.put(name, values, unit=(units or {}).get(name))
     return log
@@ -264,3 +265,22 @@ def test_gravities_and_units_that_are_none():
     text = said(log_of(units={"gyro": "furlongs"}))
     assert "unit of gyro: cannot read unit 'furlongs'" in text
     assert "`unit: rad/s` beside `columns` says otherwise" in text
+
+
+def test_a_column_that_is_not_there_gets_the_one_that_was_meant():
+    text = said(log_of(), imu={"angular_velocity": ["gyro[0]", "gyroo[1]", "gyro[2]"], "specific_force": "forc"})  # fmt: skip
+    assert "has no column 'gyroo[1]'" in text and "| gyro[1]\n" in text
+    assert text.endswith("| force")
+
+
+def test_a_foot_that_the_robot_lacks_has_its_columns_looked_at_too():
+    text = said(log_of(), contacts={"left_fot": {"force": "odd"}})
+    assert "contacts: bruce has no foot left_fot | left_fot | left_foot" in text
+    assert "contacts.left_fot: log.npz has no column 'odd'" in text
+
+
+def test_a_foot_is_in_contact_where_one_of_its_switches_is():
+    flags = np.stack([TIMES > 0.5, TIMES < 0.2], axis=1)
+    rows = played(log_of(heel_toe=flags), contacts={"left_foot": {"closed": "heel_toe"}}).rows
+    own = np.array(find_robot("bruce").foot_of_contact()) == [f.name for f in find_robot("bruce").feet].index("left_foot")  # fmt: skip
+    assert np.array_equal(rows.closed[:, own].all(axis=1), flags.any(axis=1))

@@ -17,6 +17,8 @@ from aloft.robots.description import find_robot
 from aloft.robots.kinematics import ball_feet, standing_contacts
 from aloft.runtime.language.context import Context
 
+from ...compiled import heights_and_normals
+
 BRUCE = find_robot("bruce")
 
 
@@ -77,12 +79,13 @@ def test_tiles_stay_within_their_bounds():
     kind = UnevenParameters(reach=0.6)
     under = kind.cover(step(0.05, 0.2), BRUCE, 7)
     rng, steep = np.random.default_rng(0), 0
-    for x, y in rng.uniform(-0.59, 0.59, (400, 2)).tolist():
+    places = rng.uniform(-0.59, 0.59, (400, 2))
+    for x, height, normal in zip(places[:, 0], *heights_and_normals(under, places), strict=True):
         if abs(x - 0.2) < 0.005:
             continue  # the sides of leaning tiles lean, too
         level = 0.05 if x > 0.2 else 0.0
-        assert abs(under.height(x, y) - level) <= 0.01 + 1e-3
-        steep += under.normal(x, y)[2] < math.cos(math.radians(5.01))
+        assert abs(height - level) <= 0.01 + 1e-3
+        steep += normal[2] < math.cos(math.radians(5.01))
     assert steep < 4, "only lines that meet the side of a leaning tile"
     tiles = [block for block in under.blocks if block.friction is not None]
     sizes = [block.most[k] - block.least[k] for block in tiles if not block.level for k in (0, 1)]
@@ -100,10 +103,11 @@ def test_the_robot_stands_on_a_level_tile_at_the_start(name):
     assert all(under.height(x, y) == 0.0 for x, y, _ in standing_contacts(robot).tolist())
     for ball in ball_feet(robot):  # no tile beside it is as high as the ball's surface there
         x, y, _ = standing_contacts(robot)[ball.point].tolist()
-        for way in np.linspace(0.0, 0.999 * ball.radius, 20).tolist():
-            surface = ball.radius - math.sqrt(ball.radius**2 - way**2)
-            around = ((x + way, y), (x - way, y), (x, y + way), (x, y - way))
-            assert max(under.height(*at) for at in around) <= surface
+        ways = np.linspace(0.0, 0.999 * ball.radius, 20)
+        sides = np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
+        around = (np.array([x, y]) + ways[:, None, None] * sides).reshape(-1, 2)
+        highest = heights_and_normals(under, around)[0].reshape(-1, 4).max(axis=1)
+        assert (highest <= ball.radius - np.sqrt(ball.radius**2 - ways**2)).all()
 
 
 def test_the_simulator_tells_scores_how_uneven_its_ground_is():

@@ -11,8 +11,9 @@ from aloft.logs.file.header import header_of
 from aloft.logs.file.records import Content, DamagedError
 from aloft.logs.recording.repair import repair
 from aloft.logs.recording.writer import RecordingWriter
-from aloft.runtime.running.memory import BoundGraph, Snapshot
+from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.sink import Note
+from aloft.runtime.running.snapshot import Snapshot
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 BATCHES, BATCH = 6, 10

@@ -15,8 +15,9 @@ from aloft.logs.recording.writer import RecordingWriter
 from aloft.runtime.language.block import Block, Input, Output, State
 from aloft.runtime.language.parameter_change import ParameterChange
 from aloft.runtime.language.signals import Field, Signal
-from aloft.runtime.running.memory import BoundGraph, Snapshot
+from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.sink import Note, parameter_note
+from aloft.runtime.running.snapshot import Snapshot
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 

@@ -11,8 +11,9 @@ from aloft.blocks.general.sources import Constant
 from aloft.logs import RecordingError, read
 from aloft.logs.file.header import header_of
 from aloft.logs.recording.writer import RecordingWriter
-from aloft.runtime.running.memory import BoundGraph, Snapshot
+from aloft.runtime.running.memory import BoundGraph
 from aloft.runtime.running.sink import Note
+from aloft.runtime.running.snapshot import Snapshot
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 TICKS = 60

@@ -12,8 +12,7 @@ import pytest
 
 from aloft.mathematics.arrays import Array, Array0D, Array1D, Array2D, Flags1D, Indices1D
 from aloft.mathematics.compiling.compile_calls import compile_calls
-from aloft.mathematics.compiling.equations import EquationError
-from aloft.mathematics.compiling.expressions import cross
+from aloft.mathematics.compiling.expressions import EquationError, cross
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.mathematics.kernel import expand, kernel
 from aloft.mathematics.linear_algebra import multiply_matrices, multiply_vector

@@ -11,7 +11,7 @@ import pytest
 
 from aloft.mathematics.arrays import Array1D, Array2D, Indices1D, Matrix3, Vector3
 from aloft.mathematics.compiling.compile_calls import compile_calls
-from aloft.mathematics.compiling.equations import EquationError
+from aloft.mathematics.compiling.expressions import EquationError
 from aloft.mathematics.compiling.kernel_call import KernelCall
 from aloft.mathematics.compiling.kernel_registry import written_code
 from aloft.mathematics.kernel import expand, kernel

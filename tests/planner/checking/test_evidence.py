@@ -60,11 +60,11 @@ def test_the_standing_robot() -> None:
     base = np.array([[0.0, 0.0, 0.3796]])
     pose = link_poses(robot, base, np.array([[0.0, 0, 0, 1]]), robot.standing_position[None])
     task = make_task({"name": "a", "rise": 0.1})
-    heights = body_heights(robot, task, pose, np.zeros(1))
+    heights = body_heights(robot, task, moving_shapes(robot, pose), np.zeros(1))
     assert "right_foot" not in heights
     assert heights["torso"][0] == pytest.approx(0.3796 + 0.03 - 0.055)
     # The hips' capsules, of radius 30 mm, are the nearest: 151.7 mm from axis to axis.
-    nearest = min(gap[0] for gap in _gaps(robot, pose))
+    nearest = min(gap[0] for gap in _gaps(robot, moving_shapes(robot, pose)))
     assert nearest == pytest.approx(0.151711 - 0.06, abs=1e-3)
     assert legs(robot)[0] == [
         "right_hip", "right_hip_shaft", "right_thigh", "right_calf", "right_foot",
@@ -75,7 +75,9 @@ def test_a_leg_that_ends_in_a_ball_counts_beyond_the_ball() -> None:
     robot = find_robot("solo12")
     place, turn = np.array([[0.0, 0.0, 0.5]]), np.array([[0.0, 0, 0, 1]])
     pose = link_poses(robot, place, turn, np.zeros((1, len(robot.joints))))
-    heights = body_heights(robot, make_task({"name": "a", "rise": 0.1}), pose, np.zeros(1))
+    heights = body_heights(
+        robot, make_task({"name": "a", "rise": 0.1}), moving_shapes(robot, pose), np.zeros(1)
+    )
     # The leg hangs straight down from the hips, 0.32 m long; its knee is halfway.
     assert heights["FL_LOWER_LEG"][0] == pytest.approx(0.5 - 0.16 - 0.013, abs=0.02)
 
@@ -102,11 +104,11 @@ def test_legs_lack_what_is_wanted_or_what_they_had_at_first(wanted: float) -> No
         roll = next(k for k, name in enumerate(names) if side in name and "roll" in name)
         joints[:, roll] += sign * np.linspace(0.0, 0.25, count)
     poses = link_poses(robot, np.zeros((count, 3)), np.tile([0.0, 0, 0, 1], (count, 1)), joints)
-    left, right = ([c for link in chain for c in moving_shapes(robot, poses, link)]
+    left, right = ([c for link in chain for c in moving_shapes(robot, poses)[link]]
                    for chain in legs(robot))  # fmt: skip
     gaps = np.array([closest(left, right, k) for k in range(count)])
     assert np.ptp(gaps) > 0.02, "the legs come closer or go apart"
-    lack = leg_clearance_deficit(robot, poses, wanted)
+    lack = leg_clearance_deficit(robot, moving_shapes(robot, poses), wanted)
     assert lack is not None
     # what is lacked of the nearest pair; pairs that were close at first may stay so
     assert np.all(lack >= np.minimum(wanted, gaps[0]) - gaps - 1e-3)
@@ -130,9 +132,9 @@ def test_corners_of_shapes_move_with_their_link() -> None:
         for joint in robot.joints:
             place = data.oMi[built.model.getJointId(joint.name)]
             shapes = robot.link(joint.child).shapes
-            for shape, moving in zip(shapes, moving_shapes(robot, poses, joint.child), strict=True):
+            for shape, moving in zip(shapes, moving_shapes(robot, poses)[joint.child], strict=True):
                 expected = [place.act(np.array(corner)) for corner in shape.corners]
-                np.testing.assert_allclose(moving.corners()[:, k], expected, atol=1e-12)
+                np.testing.assert_allclose(moving.corners[:, k], expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["bruce", "a1"])
@@ -148,16 +150,16 @@ def test_compiled_distances_of_legs_are_those_of_their_capsules_one_by_one(name:
     for link in compiled.names:
         for found, expected in zip(compiled.of(link), plain.of(link), strict=True):
             np.testing.assert_allclose(found, expected, atol=1e-12)
-    gaps = list(_gaps(robot, compiled))
+    gaps = list(_gaps(robot, moving_shapes(robot, compiled)))
     chains = [
-        [c for link in chain for c in moving_shapes(robot, plain, link)] for chain in legs(robot)
+        [c for link in chain for c in moving_shapes(robot, plain)[link]] for chain in legs(robot)
     ]
     pairs = [(one, two) for i, one in enumerate(chains) for two in chains[i + 1 :]]
     assert len(gaps) == len(pairs)
     for found, (one, other) in zip(gaps, pairs, strict=True):
         expected = [
             [
-                segment_gap(*(corners[k] for corners in (*a.corners(), *b.corners())))
+                segment_gap(*(corners[k] for corners in (*a.corners, *b.corners)))
                 - (a.shape.radius + b.shape.radius)
                 for k in range(count)
             ]
@@ -177,9 +179,9 @@ def test_bodies_over_a_step_are_as_high_as_their_lowest_point() -> None:
     for x in np.linspace(edge - 0.15, edge + 0.15, 13):
         pose = link_poses(robot, np.array([[x, 0.0, 0.4]]), np.array([[0.0, 0.6, 0, 0.8]]),
                           robot.standing_position[None])  # fmt: skip
-        heights = body_heights(robot, task, pose, np.zeros(1))
+        heights = body_heights(robot, task, moving_shapes(robot, pose), np.zeros(1))
         lowest = np.inf
-        for moving in moving_shapes(robot, pose, "torso"):
+        for moving in moving_shapes(robot, pose)["torso"]:
             (start, end), radius = moving.edges()[0], moving.shape.radius
             centres = start + share * (end - start)
             for aside in np.linspace(-0.999, 0.999, 201):
@@ -220,6 +222,11 @@ def random_shape(random: np.random.Generator, hull: bool) -> Hull | Capsule:
     return Capsule(start=tuple(corners[0]), end=tuple(corners[1]), radius=0.02)
 
 
+def at_poses(shape: Hull | Capsule, place: np.ndarray, turn: np.ndarray) -> MovingShape:
+    corners = np.array([place + turn @ np.array(corner) for corner in shape.corners])
+    return MovingShape(shape, place, turn, corners)
+
+
 @pytest.mark.parametrize(("first", "second"), [(True, True), (True, False), (False, True)])
 def test_hulls_are_as_far_apart_as_their_nearest_points(first: bool, second: bool) -> None:
     random = np.random.default_rng(3)
@@ -229,12 +236,12 @@ def test_hulls_are_as_far_apart_as_their_nearest_points(first: bool, second: boo
         turn = matrices_of_quaternions(quaternions)
         place = random.uniform(-0.15, 0.15, (2, 6, 3))
         one, other = (
-            MovingShape(random_shape(random, hull), place[k], turn[k])
+            at_poses(random_shape(random, hull), place[k], turn[k])
             for k, hull in enumerate((first, second))
         )
         (gaps,) = gaps_between([one], [other])
         for k, gap in enumerate(gaps):
-            apart = least_distance(one.corners()[:, k], other.corners()[:, k])
+            apart = least_distance(one.corners[:, k], other.corners[:, k])
             expected = apart - one.shape.radius - other.shape.radius
             if gap > FAR:
                 assert gap <= expected + 1e-9  # balls around them are that far apart

@@ -203,7 +203,7 @@ def test_the_lowest_point_of_feet_and_body_is_named_with_its_time(by_hand: Plann
     assert tests["foot_below_ground"].value == pytest.approx(-lowest[point], abs=1e-12)
     when = int(e.point_height[:, CONTACTS.index(point)].argmin())
     assert tests["foot_below_ground"].where == f"{point} {e.moment(when)}"
-    heights = body_heights(ROBOT, sunk.task, e.poses, e.progress)
+    heights = body_heights(ROBOT, sunk.task, e.shapes, e.progress)
     link, height = min(heights.items(), key=lambda item: float(item[1].min()))
     assert height.min() < 0.0
     assert tests["body_on_ground"].value == pytest.approx(-height.min(), abs=1e-12)
@@ -401,7 +401,7 @@ def test_clearances_and_the_speed_of_touchdown_are_named(by_hand: PlannedJump) -
     names = ("foot clearance", "leg clearance", "ground clearance")
     assert not set(names) & set(active_limits(scaled(by_hand, foot_clearance=high - 0.01), ROBOT))
     assert "foot clearance" in active_limits(scaled(by_hand, foot_clearance=high), ROBOT)
-    low = body_heights(ROBOT, by_hand.task, evidence.poses, evidence.progress)
+    low = body_heights(ROBOT, by_hand.task, evidence.shapes, evidence.progress)
     lowest = min(float(heights.min()) for heights in low.values())
     assert "ground clearance" in active_limits(scaled(by_hand, margins=Margins(step=lowest)), ROBOT)
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aloft.planner.checking.validity import InvalidPlanError
 from aloft.planner.library.library import (
     SHIPPED,
     PlanLibrary,
@@ -21,7 +20,7 @@ from aloft.planner.library.library import (
     task_distance,
 )
 from aloft.planner.task.files import PlanError
-from aloft.planner.task.plan import PlanFileError, PlannedJump, write_plan
+from aloft.planner.task.plan import InvalidPlanError, PlanFileError, PlannedJump, write_plan
 from aloft.planner.task.read_task import read_task
 from aloft.planner.task.task import JumpTask, make_task
 from aloft.robots.description import RobotDescription, find_robot

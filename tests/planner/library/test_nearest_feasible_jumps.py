@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from aloft.planner.checking.validity import InvalidPlanError
 from aloft.planner.library.library import SHIPPED, PlanLibrary, solve_and_check
 from aloft.planner.library.nearest_feasible import nearest_feasible, seconds_left
 from aloft.planner.solving.solve import make_problem
 from aloft.planner.solving.solver_process import cpu_time
 from aloft.planner.task.files import PlanError
+from aloft.planner.task.plan import InvalidPlanError
 from aloft.planner.task.task import make_task
 from aloft.robots.description import find_robot
 

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from aloft.mathematics.kept_arrays import code_digest
-from aloft.planner.checking.validity import InvalidPlanError
+from aloft.planner.checking import validity
 from aloft.planner.library import validation_cache
 from aloft.planner.library.library import PlanLibrary, shipped_folder
 from aloft.planner.library.reference_table import reference_table
 from aloft.planner.library.validation_cache import NOTES, check_unless_noted
+from aloft.planner.task.plan import InvalidPlanError
 from aloft.planner.task.read_task import read_task
 from aloft.robots.description import find_robot
 
@@ -38,7 +39,7 @@ def plan():
 def test_the_same_plan_is_checked_once_and_a_changed_one_again(plan, monkeypatch):
     checked = []
     monkeypatch.setattr(validation_cache, "_valid", validation_cache.ResultCache())
-    monkeypatch.setattr(validation_cache, "require_valid", lambda plan, robot: checked.append(plan))
+    monkeypatch.setattr(validity, "require_valid", lambda plan, robot: checked.append(plan))
     validation_cache.require_valid_cached(plan, ROBOT)
     validation_cache.require_valid_cached(replace(plan, com=plan.com.copy()), ROBOT)
     assert len(checked) == 1

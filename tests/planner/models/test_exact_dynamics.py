@@ -5,9 +5,12 @@ Motion with and without contact forces against the base's equations of motion, i
 
 import numpy as np
 import pytest
+from tests.planner.one_interval import JointMotion, integrate
 from tests.robots.limbed_robots import quadruped
 
-from aloft.planner.models.exact_dynamics import ExactDynamics, JointMotion, rotation_between
+from aloft.mathematics.compiling.compile_calls import run_compiled
+from aloft.mathematics.whole_body_motion import velocities_at_points
+from aloft.planner.models.exact_dynamics import ExactDynamics, rotation_between, states_between
 from aloft.robots.description import RobotDescription, find_robot
 
 
@@ -48,7 +51,7 @@ def test_in_flight_the_centre_falls_and_the_angular_momentum_stays(
     end = q[7:] + np.random.default_rng(1).normal(size=10) * 0.3
     joints = JointMotion(q[7:], end, v[6:], np.zeros(10), 0.3)
     com, speed, momentum = dynamics.centroidal(q, v)
-    last_time, last_q, last_v = dynamics.integrate(q, v, joints, np.zeros((4, 3)), 1e-3)[-1]
+    last_time, last_q, last_v = integrate(dynamics, q, v, joints, np.zeros((4, 3)), 1e-3)[-1]
     assert last_time == pytest.approx(0.3)
     after, after_speed, after_momentum = dynamics.centroidal(last_q, last_v)
     gravity = np.array([0.0, 0.0, -9.81])
@@ -93,6 +96,25 @@ def test_the_joints_cubic_meets_both_ends_and_a_constant_acceleration() -> None:
     assert acceleration[0] == pytest.approx(40.0, rel=1e-9)
 
 
+def test_states_between_knots_have_the_bits_of_whole_arrays() -> None:
+    rng, knots, n = np.random.default_rng(6), 12, 300
+    place, rate, time = (
+        rng.normal(size=(knots, 7)),
+        rng.normal(size=(knots, 7)),
+        np.arange(12) * 0.1,
+    )
+    time[5:] += 0.013 - 0.1  # at an impact two knots have one time
+    time[6] = time[5]
+    place[:, 2], rate[:, 2], knot = 0.0, -0.0, rng.integers(0, knots - 1, n)
+    length = (time[knot + 1] - time[knot])[:, None]
+    passed = rng.random(n) * length[:, 0]
+    length[length == 0.0] = 1.0
+    plain = JointMotion(place[knot], place[knot + 1], rate[knot], rate[knot + 1], length)
+    found = states_between(place, rate, time, knot, passed)
+    wanted = plain.at(passed[:, None])
+    assert [each.tobytes() for each in found] == [each.tobytes() for each in wanted]
+
+
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.3, 3.0])
 def test_rotation_between(angle: float) -> None:
     first = np.array([0.0, 0.0, 0.0, 1.0])
@@ -110,6 +132,7 @@ def test_many_states_at_once_are_those_of_pinocchio(robot: RobotDescription) -> 
     bend, force = rng.normal(size=(6, 6 + n)), rng.normal(size=(6, len(robot.contacts), 3)) * 20.0
     terms = dynamics.motion(q, v, bend[:, 6:], force)
     left = dynamics.base_residual(q, v, bend, force)
+    feet = dynamics.feet(q, v)
     for i in range(6):
         for found, wanted in zip(
             (terms.com, terms.com_velocity, terms.momentum),
@@ -120,6 +143,11 @@ def test_many_states_at_once_are_those_of_pinocchio(robot: RobotDescription) -> 
         points, jacobian = dynamics.contact_jacobians(q[i])
         soles, heading = dynamics.soles(q[i])
         np.testing.assert_allclose(terms.points[i], np.vstack([points, soles]), atol=1e-13)
+        for name in ("com", "com_velocity", "momentum"):
+            found, wanted = getattr(feet, name)[i], getattr(terms, name)[i]
+            np.testing.assert_allclose(found, wanted, atol=1e-12)
+        np.testing.assert_allclose(feet.soles[i], soles, atol=1e-13)
+        np.testing.assert_allclose(feet.yaw[i], heading, atol=1e-12)
         speeds = (jacobian @ v[i]).reshape(-1, 3)
         np.testing.assert_allclose(terms.point_velocity[i, : len(points)], speeds, atol=1e-12)
         pushed = jacobian.T @ force[i].ravel()
@@ -127,7 +155,24 @@ def test_many_states_at_once_are_those_of_pinocchio(robot: RobotDescription) -> 
         np.testing.assert_allclose(left[i], (moved - pushed)[:6], atol=1e-10)
         ahead = terms.ahead[i, len(points) :]
         if not dynamics.balls:
+            np.testing.assert_allclose(
+                feet.sole_velocity[i], terms.point_velocity[i, len(points) :], atol=1e-12
+            )
             np.testing.assert_allclose(np.arctan2(ahead[:, 1], ahead[:, 0]), heading, atol=1e-12)
+
+
+def test_speeds_of_points_have_the_bits_of_whole_jacobians() -> None:
+    rng, count, points, size = np.random.default_rng(4), 50, 3, 21
+    columns, velocity = rng.normal(size=(count, size, 6)), rng.normal(size=(count, size))
+    places, moves = rng.normal(size=(count, points, 3)), rng.random((points, size)) < 0.6
+    found = np.empty((count, points, 6))
+    run_compiled(velocities_at_points, columns, moves, places, velocity, np.empty((6, size)), found)
+    for point in range(points):
+        x, y, z = places[:, point].T[:, :, None]
+        a, b, c, p, q, r = np.moveaxis(columns, -1, 0)
+        at_point = a - (y * r - z * q), b - (z * p - x * r), c - (x * q - y * p), p, q, r
+        jacobian = np.where(moves[point], np.stack(at_point, axis=1), 0.0)
+        assert (found[:, point] == (jacobian * velocity[:, None]).sum(axis=-1)).all()
 
 
 Array = np.ndarray
@@ -185,7 +230,7 @@ def test_motion_is_that_of_the_equations_of_motion(
         q[7:], q[7:] + 0.1 * rng.normal(size=n), v[6:], rng.normal(size=n), 0.05
     )  # fmt: skip
     force = rng.normal(size=(len(robot.contacts), 3)) * newtons
-    found = dynamics.integrate(q, v, joints, force, 0.001)
+    found = integrate(dynamics, q, v, joints, force, 0.001)
     wanted = stepped(dynamics, q, v, joints, force, 50)
     assert [time for time, _, _ in found] == pytest.approx([0.001 * (i + 1) for i in range(50)])
     for (_, place, speed), state in zip(found, wanted, strict=True):
@@ -202,8 +247,8 @@ def test_two_steps_over_an_interval_are_exact_enough() -> None:
     v = 0.5 * rng.normal(size=16)
     joints = JointMotion(q[7:], q[7:] + 0.025 * v[6:], v[6:], v[6:], 0.025)
     force = np.tile([2.0, 1.0, 15.0], (4, 1))
-    _, place, speed = dynamics.integrate(q, v, joints, force, 0.0125)[-1]
-    _, exact, moving = dynamics.integrate(q, v, joints, force, 0.0005)[-1]
+    _, place, speed = integrate(dynamics, q, v, joints, force, 0.0125)[-1]
+    _, exact, moving = integrate(dynamics, q, v, joints, force, 0.0005)[-1]
     np.testing.assert_allclose(place, exact, atol=1e-6)
     np.testing.assert_allclose(speed, moving, atol=1e-4)
 

@@ -11,7 +11,7 @@ import numpy as np
 from aloft.mathematics.arrays import Array
 from aloft.mathematics.constants import GRAVITY
 from aloft.mathematics.rotations import matrices_of_quaternions, multiply
-from aloft.planner.models.euler_angles import angular_motion, euler_angles, euler_rates, rotation
+from aloft.planner.models.euler_angles import ORDER, coordinates_of, rotation, twist_of
 from aloft.planner.models.exact_dynamics import ExactDynamics
 from aloft.planner.task.phase import Phase
 from aloft.planner.task.plan import PlannedJump
@@ -82,8 +82,7 @@ def rigid_body_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> dict[str
         found[name] = max(found[name], float(np.abs(value).max()))
 
     inertia = standing_inertia(plan, dynamics)
-    angles = euler_angles(plan.position[:, 3:7])
-    rates = np.array([euler_rates(a, v[3:6]) for a, v in zip(angles, plan.velocity, strict=True)])
+    angles, rates = (each[:, 3:6] for each in coordinates_of(plan.position, plan.velocity))
     place, rate = np.hstack([plan.com, angles]), np.hstack([plan.com_velocity, rates])
     places = {False: dynamics.points(plan.position[0]), True: dynamics.points(plan.position[-1])}
     for k in range(len(plan.time) - 1):
@@ -93,8 +92,8 @@ def rigid_body_residuals(plan: PlannedJump, dynamics: ExactDynamics) -> dict[str
         middle = place[k] + 0.5 * h * rate[k] + 0.125 * h * h * bend
         moving = rate[k] + 0.5 * h * bend
         note("force balance", bend[:3] - force.sum(axis=0) / dynamics.mass - WEIGHT)
-        spin, spun = angular_motion(middle[3:], moving[3:], bend[3:])
-        turn = rotation(middle[3:])
+        spin, spun = (each[3:] for each in twist_of(middle, moving, bend))
+        turn = rotation(middle[3:][ORDER])
         landed = plan.time[k] > plan.touchdown_time - 1e-9
         moment = np.cross(places[landed] - middle[:3], force).sum(axis=0)
         note("moment balance", turn @ (inertia @ spun + np.cross(spin, inertia @ spin)) - moment)

@@ -26,7 +26,7 @@ def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return []
 
 
-def load(made: list[str], **options: Any) -> dict[str, StageFunction]:
+def load(made: list[str], kind: str = "test", **options: Any) -> dict[str, StageFunction]:
     def make(name: str) -> StageFunction:
         made.append(name)
         z, w = ca.SX.sym("z", 2), ca.SX.sym("w")
@@ -34,7 +34,7 @@ def load(made: list[str], **options: Any) -> dict[str, StageFunction]:
 
     model: Any = type("Model", (SymbolicModel,), {"__init__": lambda self: None})()
     model.robot, model.loads = find_robot("bruce"), ()
-    return load_functions(FunctionSet("test", PIECES, (), make), model, **options)
+    return load_functions(FunctionSet(kind, PIECES, (), make), model, **options)
 
 
 def values(pieces: dict[str, StageFunction]) -> list[list[float]]:
@@ -59,6 +59,19 @@ def test_once_derived_always_there(made: list[str], monkeypatch: pytest.MonkeyPa
             ours, kept = (getattr(pieces[name], kind) for pieces in (first, second))
             assert kept.name() == ours.name() == f"test_{name}_{kind}"
             assert all(map(np.array_equal, kept.arrays(), ours.arrays()))
+
+
+def test_only_the_sets_asked_for_last_are_held(made: list[str]) -> None:
+    """A process that plans for one robot after another does not grow with every one."""
+    first = load(made, "set_0")
+    for number in range(1, kept_functions.KEPT):
+        load(made, f"set_{number}")
+    assert load(made, "set_0")["slow"] is first["slow"]
+    load(made, "one_more")  # in place of set 1, for which nobody has asked since
+    assert len(kept_functions._held) == kept_functions.KEPT
+    assert load(made, "set_0")["slow"] is first["slow"]
+    made.clear()
+    assert values(load(made, "set_1")) == values(first) and made == []  # read from the disk
 
 
 def test_progress_names_what_is_derived(made: list[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,10 +7,13 @@ Toes, knees and the room of the joints, from a robot's description alone.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from tests.robots.limbed_robots import quadruped
 
+from aloft.planner.task import scaling
 from aloft.planner.task.scaling import (
     KEPT,
     knee_limits,
@@ -23,6 +26,7 @@ from aloft.planner.task.scaling import (
 )
 from aloft.planner.task.task import make_task
 from aloft.robots.description import RobotDescription, find_robot
+from aloft.robots.kinematics import LinkPoses, link_poses
 
 HEAVY = quadruped().changed(
     links=tuple(link.model_copy(update={"mass": 4.0 * link.mass}) for link in quadruped().links)
@@ -123,6 +127,21 @@ def test_the_knee_is_what_bends_the_leg_most() -> None:
     standing = BRUCE.standing_position[[joint.name for joint in BRUCE.joints].index("left_knee")]
     nearly = knee_limits(BRUCE, 2.0)["knee"]
     assert nearly[1] == pytest.approx(0.8 * standing, abs=0.01), "no more than where it stands"
+
+
+def test_knees_are_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = find_robot("bruce").changed(text="nobody asked about it before")
+    calls = list[int]()
+
+    def counted(*arguments: Any) -> LinkPoses:
+        calls.append(len(arguments[-1]))
+        return link_poses(*arguments)
+
+    monkeypatch.setattr(scaling, "link_poses", counted)
+    toe_push(robot)
+    knee_limits(robot, 0.3)
+    # each joint of a leg to both sides, its knee at all angles, and the pose it stands in
+    assert sorted(calls) == [1, 10, 10, 181, 181]
 
 
 def test_the_room_is_that_of_the_standing_joint_nearest_to_a_limit() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from aloft.planner.task.read_task import read_task
-from aloft.planner.task.task import JumpTask, JumpTaskError, Knots, make_task
+from aloft.planner.task.task import _LEADING, JumpTask, JumpTaskError, Knots, make_task
 from aloft.robots.description import find_robot
 
 
@@ -41,6 +41,38 @@ def test_what_is_wrong_is_said_with_its_key(values: dict[str, object], words: st
     with pytest.raises(JumpTaskError) as caught:
         make_task({"name": "a", **values}, where="jump.yaml")
     assert f"jump.yaml: {words}" in str(caught.value)
+
+
+COPIED = (
+    {"rise": 0.1, "distance_x": 0.1},
+    {"rise": 0.1, "jumps": [{"distance_x": 0.1}, {"rise": 0.05}], "repeat": 2},
+    {"rise": 0.1, "slope": [0.05, 0.0], "jumps": [{"landing_slope": [0.0, 0.1]}]},
+    {"rise": 0.1, "repeat": 3, "rough": {"seed": 1}},
+)
+
+
+@pytest.mark.parametrize("values", COPIED)
+def test_a_copy_keeps_where_it_leads_unless_that_changes(values: dict[str, object]) -> None:
+    task = make_task({"name": "a", **values})
+    hops, places = task.hops(), task.places()
+    same = task.model_copy(update={"effort": 0.7, "name": "b"})
+    assert same.hops() is hops and same.places() is places
+    moved = task.model_copy(update={"twist": 0.3})
+    assert moved.hops() == make_task({"name": "a", "twist": 0.3, **values}).hops() != hops
+
+
+@pytest.mark.parametrize("values", COPIED)
+def test_hops_and_places_follow_from_what_counts_as_leading(values: dict[str, object]) -> None:
+    task, read = make_task({"name": "a", **values}), set[str]()
+
+    class Watched:
+        def __getattr__(self, name: str) -> object:
+            read.add(name)
+            return getattr(task, name)
+
+    for name in ("_every_hop", "_every_place"):
+        vars(JumpTask)[name].func(Watched())
+    assert read & set(JumpTask.model_fields) <= _LEADING
 
 
 def test_all_that_is_wrong_is_said_at_once() -> None:

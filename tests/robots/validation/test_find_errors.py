@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from aloft.robots.description import RobotDescription, find_robot
-from aloft.robots.validation import RobotError, find_errors
+from aloft.robots.validation import RobotError, errors, find_errors
 
 from .wrong_robots import WRONG_BODIES, Change, hopper
 from .wrong_stances import WRONG_STANCES
@@ -84,6 +84,17 @@ def test_the_headline_counts(tmp_path: Path) -> None:
 def test_what_has_no_fault_can_be_read() -> None:
     assert find_errors(hopper()) == ()
     assert RobotDescription.model_validate(hopper()).name == "hopper"
+
+
+def test_parts_of_what_has_no_fault_are_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    # As parts of the whole: to read each by itself makes pydantic's validator of every kind of part.
+    def read(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(errors, "_read", read)
+    assert find_errors(with_mesh()) == ()
+    with pytest.raises(AssertionError):
+        find_errors({**hopper(), "name": 3})
 
 
 @pytest.mark.parametrize(

@@ -103,9 +103,8 @@ def test_live_parameters_hold_from_the_runs_that_are_sampled_then(use: str, name
     background, loop = both(use, 6)
     result = run(background, sinks=[ChangeAt(**{name: (17, 0.5)})])
     assert_equal(result, run(loop, sinks=[ChangeAt(**{name: (17, 0.5)})]))
-    assert not np.array_equal(
-        result.signal("motor.y.value"), run(background).signal("motor.y.value")
-    )
+    # what it is without the change the loop tells, too, and needs no process for that
+    assert not np.array_equal(result.signal("motor.y.value"), run(loop).signal("motor.y.value"))
 
 
 @pytest.mark.long

@@ -2,12 +2,15 @@
 
 import gc
 import threading
+import weakref
 from collections.abc import Iterator
 
 import pytest
 
+import aloft
 from aloft.runtime.language import collector
 from aloft.runtime.language.collector import collector_off, collector_paused, objects_frozen
+from aloft.runtime.loading.checking import check_graph
 
 
 def test_threads_that_end_in_any_order_leave_the_collector_on() -> None:
@@ -81,3 +84,18 @@ def test_what_others_froze_stays_frozen_and_is_counted_once(
             made = [[] for _ in range(1000)]
     assert len(made) == 1000 and len(counted) == 1
     assert 0.999 * frozen <= count() <= frozen
+
+
+def test_a_load_leaves_nothing_to_collect() -> None:
+    # Not at its end, and not when the graph is given up: else each load of thousands of blocks adds to memory.
+    blocks = [f"  g{k}: {{use: blocks.Gain, in: {{u: g{k - 1}.y}}}}" for k in range(1, 9)]
+    text = "\n".join(["rate: 100 Hz", "blocks:", "  g0: {use: blocks.SineWave}", *blocks])
+    aloft.load(text)  # what is made once
+    gc.collect()
+    with collector_off():
+        graph = aloft.load(text)
+        known = [weakref.ref(block) for block in graph.checked.flat.blocks]
+        drafts = [o for o in gc.get_objects() if type(o).__module__ == check_graph.__name__]
+        assert len(known) == 9 and drafts == []
+        del graph
+        assert [ref() for ref in known] == [None] * 9

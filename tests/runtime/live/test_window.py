@@ -18,7 +18,8 @@ from aloft.runtime.live.window import (
 )
 from aloft.runtime.loading import checked_file
 from aloft.runtime.running.executor import Executor
-from aloft.runtime.running.memory import BoundGraph, nameless_memory
+from aloft.runtime.running.memory import BoundGraph
+from aloft.runtime.running.snapshot import nameless_memory
 from aloft.runtime.running.timing import STAMPED_TICKS
 
 

@@ -11,7 +11,7 @@ from aloft.mathematics.compiling.compile_calls import compile_calls
 from aloft.runtime.language.layout import Layout, PortLayout
 from aloft.runtime.language.signals import Field, Signal
 from aloft.runtime.running.finite import FiniteCheck, NotFiniteError
-from aloft.runtime.running.memory import Region
+from aloft.runtime.running.region import Region
 
 
 class Many(Signal):
@@ -83,7 +83,7 @@ def test_numpy_does_not_warn_of_what_is_found() -> None:
     from aloft.runtime.language.layout import Layout, PortLayout
     from aloft.runtime.language.signals import Field, Signal
     from aloft.runtime.running.finite import FiniteCheck, NotFiniteError
-    from aloft.runtime.running.memory import Region
+    from aloft.runtime.running.region import Region
 
     class Two(Signal):
         value = Field(2, text="both infinities")

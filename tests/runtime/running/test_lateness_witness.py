@@ -18,8 +18,8 @@ from aloft.runtime.language.block import Block, Output
 from aloft.runtime.language.parameters import Parameters
 from aloft.runtime.language.stages import ClockSpec
 from aloft.runtime.running.executor import Executor
-from aloft.runtime.running.memory import nameless_memory
 from aloft.runtime.running.pacing import WallTime
+from aloft.runtime.running.snapshot import nameless_memory
 from aloft.runtime.testing.graphs import BlockUse, checked_graph
 
 TICKS, RATE = 120, 100.0

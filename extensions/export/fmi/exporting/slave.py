@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from .....runtime.graph import load
 from .....runtime.language.errors import AloftError
 from .....runtime.language.units import BASE_UNITS, parse_unit
-from .....runtime.running.memory import Snapshot
+from .....runtime.running.snapshot import Snapshot
 from ..instance import release_at_exit
 
 _HEAD = struct.Struct("<qqqq")

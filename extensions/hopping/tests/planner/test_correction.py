@@ -9,6 +9,7 @@ from aloft.extensions.hopping.planner import correction
 from aloft.extensions.hopping.planner.correction import Corrector
 from aloft.extensions.hopping.planner.hop_plans import samples_of_hops
 from aloft.extensions.hopping.planner.hop_request import HopRequest, coarse, task_of
+from aloft.planner.problem.program_functions import program_functions
 from aloft.planner.problem.unpacking import pack
 from aloft.planner.solving.solve import make_problem
 from aloft.planner.solving.solver import VIOLATION, violation_of
@@ -27,7 +28,7 @@ def problem_and_guess(wanted: HopRequest):
 @pytest.mark.long
 def test_all_constraints_hold_near_the_guess() -> None:
     problem, guess = problem_and_guess(HopRequest(0.13, 0.04, 0.2))
-    constraint = problem.assembly.functions()["nlp_g"]
+    constraint = program_functions(problem.assembly)["nlp_g"]
     assert violation_of(problem, guess, constraint)[0] > 1e-2
     found = Corrector(problem).correct(problem, guess)
     assert found.solved

@@ -12,7 +12,7 @@ BOTH = """
 import dataclasses, json, sys
 from dataclasses import dataclass, field
 if sys.argv[1] == "later":
-    from aloft.cli.shared.dataclass_methods import make_when_called
+    from aloft.processes.quick_imports import make_when_called
     make_when_called()
     make_when_called()
 
