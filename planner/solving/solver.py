@@ -14,7 +14,6 @@ import numpy as np
 from ...mathematics.arrays import Array
 from ..problem.assembly import Assembly, NonlinearProgram
 from ..problem.program_functions import program_functions
-from .blasfeo import use_fast_product
 from .solver_process import call_bounded, call_solver, cpu_time, without_output
 
 VIOLATION = 1e-6
@@ -218,7 +217,4 @@ def _make_solver(
             "grad_f": functions["grad_f"], "no_nlp_grad": True, "ipopt": own,
         }  # fmt: skip
     with without_output():
-        made = ca.nlpsol("jump", name, nlp, options)
-    if name == "fatrop":
-        use_fast_product()
-    return made
+        return ca.nlpsol("jump", name, nlp, options)
