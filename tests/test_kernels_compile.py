@@ -64,7 +64,6 @@ NOT_HOT = {
     "hal.log.columns.with_hysteresis": "before a run, when the log is read",
     "hal.log.joint_columns._times": "before a run, when the log is read",
     "hal.log.log_file._no_column": "before a run, when the log is read",
-    "hal.log.tables._missing": "before a run, when the log is read",
     "hal.log.turns.quaternion_of_rpy": "before a run, when the log is read",
     "hal.log.turns.rates_of": "before a run, when the log is read",
     "hal.log.turns.rotation_of": "before a run, when the log is read",
