@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,6 +19,7 @@ from .logged_joints import (
     LoggedJoints,
     columns_of_joints,
     commented,
+    doubt_of,
     lists_of_joints,
     name_joints,
 )
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 
 _WORDS: Mapping[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
     "time": (("stamp", "time", "t"), (1,)),
-    "angular_velocity": (("angular_velocity", "gyr", "omega", "w"), (3,)),
     "specific_force": (("specific_force", "linear_acceleration", "acc", "a"), (3,)),
+    "angular_velocity": (("angular_velocity", "gyr", "omega", "w"), (3,)),
     "joint_position": (
         ("joint_position", "jointspos", "joint_states.position", "position", "pos", "q"),
         (),
@@ -42,14 +43,14 @@ _WORDS: Mapping[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
         (),
     ),
     "joint_torque": (("joint_torque", "effort", "torque", "tau"), ()),
-    "truth_position": (("basepos", "base_position", "mocap", "pose.position"), (3,)),
+    "truth_position": (
+        ("basepos", "truth.base_position", "base_position", "mocap", "pose.position"),
+        (3,),
+    ),
     "truth_rpy": (("baserot", "base_rpy", "rpy"), (3,)),
-    "truth_quaternion": (("quaternion", "pose.orientation"), (4,)),
+    "truth_quaternion": (("quaternion", "pose.orientation", "base_orientation"), (4,)),
 }
 """Words in the names of columns, the likeliest first, and their widths; none: as many as there are joints."""
-_LIKELY = ("meas", "actual", "fbk", "feedback")
-_UNLIKELY = ("des", "ref", "cmd", "command", "target", "setpoint", "filt", "fric", "err", "con")
-"""Words of what was measured, and of what was wanted or computed: no sensor."""
 _FORCE = re.compile(r"(force|grf)_?z?$|fz$", re.IGNORECASE)
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+")
 _SIDES = {"l": "left", "lf": "left", "left": "left", "r": "right", "rf": "right", "right": "right"}
@@ -101,7 +102,11 @@ def import_log(
         guessed = guess(widths, _numbers_of_joints(found, described, given))
         if described is not None and "joint_position" not in guessed:
             guessed = guess(widths)
-        own = {} if described is None else columns_of_joints(widths, described)
+        own = (
+            {}
+            if described is None
+            else columns_of_joints(widths, described, _one(guessed.get("specific_force", "")))
+        )
         forces = {} if described is None else forces_of_feet(widths, described)
         target = out or file.with_suffix(".yaml")
         if target.exists() and not force:
@@ -127,6 +132,10 @@ def import_log(
                 for foot, column in forces.items()
             }
         guessed |= {f"force of {foot}": column for foot, column in forces.items()}
+        switches = {} if described is None or forces else switches_of_feet(widths, described)
+        if switches:
+            played["contacts"] = {foot: {"closed": each} for foot, each in switches.items()}
+            guessed |= {f"contact of {foot}": each for foot, each in switches.items()}
         notes = _clock(found, played, guessed)
         named = LoggedJoints()
         if "joints" in played:
@@ -184,6 +193,10 @@ def _numbers_of_joints(
         return (len(given),)
     listed = {len(names) for names in lists_of_joints(log.texts, robot).values()}
     return tuple(listed) or (() if robot is None else (len(robot.joints),))
+
+
+def _one(guess: Guess) -> str:
+    return guess if isinstance(guess, str) else guess[0]
 
 
 def _beside(graph: Path, file: Path) -> Path:
@@ -261,6 +274,22 @@ def forces_of_feet(widths: Mapping[str, int], robot: RobotDescription) -> dict[s
     return found
 
 
+def switches_of_feet(widths: Mapping[str, int], robot: RobotDescription) -> dict[str, list[str]]:
+    """Return the columns of the switches in each foot's points, where a log of aloft has one for every point."""
+    whole = [name for name, width in widths.items() if width == len(robot.contacts) > 0]
+    columns = {name: [f"{name}[{k}]" for k in range(widths[name])] for name in whole} | {
+        stem: each for stem, each in numbered(widths).items() if len(each) == len(robot.contacts)
+    }
+    found = [each for name, each in columns.items() if name.endswith(".contacts.closed")]
+    if len(found) != 1:
+        return {}
+    owners = robot.foot_of_contact()
+    return {
+        foot.name: [column for column, owner in zip(found[0], owners, strict=True) if owner == k]
+        for k, foot in enumerate(robot.feet)
+    }
+
+
 def _side(name: str) -> str | None:
     words = (word.lower() for word in _WORD.findall(name))
     return next((_SIDES[word] for word in words if word in _SIDES), None)
@@ -287,10 +316,12 @@ def guess(widths: Mapping[str, int], joints: Collection[int] = ()) -> dict[str, 
         free = [name for name in known if name not in guessed.values()]
         fitting = [
             name
-            for name in sorted(free, key=_doubt)
+            for name in free
             if (known[name] in allowed if allowed else _of_joints(name, known, counted, joints))
         ]
-        column = _first(words, fitting)
+        measured = not what.startswith("truth")
+        beside = guessed.get("specific_force" if measured else "truth_position", "")
+        column = _best(words, fitting, _one(beside), measured)
         if column is not None:
             guessed[what] = column
     return {what: series.get(str(column), column) for what, column in guessed.items()}
@@ -334,21 +365,20 @@ def _of_joints(
     return widths[name] > 4 or name in series
 
 
-def _doubt(name: str) -> int:
-    """Return 0 for a column that says that it was measured, 2 for one that was wanted or computed, else 1."""
-    parts = re.split(r"[^a-z]+", name.lower())
-    if any(word in name.lower() for word in _LIKELY):
-        return 0
-    return 2 if any(word in parts for word in _UNLIKELY) else 1
-
-
-def _first(words: Iterable[str], names: list[str]) -> str | None:
-    for word in words:
-        for name in names:
-            plain = name.lower().replace("/", ".")
-            if word in plain if len(word) > 2 else word == plain:
-                return name
-    return None
+def _best(words: Sequence[str], names: Iterable[str], beside: str, measured: bool) -> str | None:
+    """Return the name that has one of some words: which it is, measured rather than computed, like the one beside it, by the first word."""
+    ranked = []
+    for order, name in enumerate(names):
+        plain = name.lower().replace("/", ".")
+        said = [
+            k for k, word in enumerate(words) if (word in plain if len(word) > 2 else word == plain)
+        ]
+        if said:
+            doubt, apart = doubt_of(name, beside)
+            ranked.append(
+                (name not in words, doubt if measured else 0, apart, said[0], order, name)
+            )
+    return min(ranked)[-1] if ranked else None
 
 
 def graph_of(

@@ -29,6 +29,12 @@ _KINDS = {
     "position": {"pos", "position", "angle", "q", "meas", "measured"},
 }
 """Words beside a joint's name in a column's."""
+_LIKELY = ("meas", "actual", "fbk", "feedback")
+_UNLIKELY = (
+    "des", "ref", "cmd", "command", "target", "setpoint", "filt", "fric", "err", "con",
+    "estimate", "estimated", "estimator", "plan", "planned", "predicted", "reference", "truth",
+)  # fmt: skip
+"""Words of what was measured, and of what was wanted, computed or known to a simulator only: no sensor."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +57,20 @@ class LoggedJoints:
     notes: list[str] = field(default_factory=list)
 
 
+def doubt_of(name: str, beside: str = "") -> tuple[int, int]:
+    """Return by how much a column is in doubt: 0 if its name says that it was measured, 2 if it was wanted or computed, else 1; and
+    less, the more words it begins with as the column ``beside`` does, which was measured."""
+    parts = re.split(r"[^a-z]+", name.lower())
+    shared = 0
+    for one, other in zip(_words(name), _words(beside), strict=False):
+        if one != other:
+            break
+        shared += 1
+    if any(word in name.lower() for word in _LIKELY):
+        return 0, -shared
+    return (2 if any(word in parts for word in _UNLIKELY) else 1), -shared
+
+
 def lists_of_joints(
     texts: Mapping[str, Sequence[str]], robot: RobotDescription | None
 ) -> dict[str, list[str]]:
@@ -65,11 +85,16 @@ def lists_of_joints(
     }
 
 
-def columns_of_joints(widths: Mapping[str, int], robot: RobotDescription) -> dict[str, Any]:
-    """Return what `joints` is to be where columns of one number have a joint's name each, such as ``l_knee_vel``; else nothing."""
+def columns_of_joints(
+    widths: Mapping[str, int], robot: RobotDescription, beside: str = ""
+) -> dict[str, Any]:
+    """Return what `joints` is to be where columns of one number have a joint's name each, such as ``l_knee_vel``; else nothing.
+
+    Of several columns of a joint, the one that is least in doubt is taken; ``beside`` is one that was measured.
+    """
     names = [joint.name for joint in robot.joints]
     found: dict[str, dict[str, str]] = {kind: {} for kind in _KINDS}
-    for column, width in widths.items():
+    for column, width in sorted(widths.items(), key=lambda each: doubt_of(each[0], beside)):
         words = _words(column)
         own = [name for name in names if _without(words, _words(name)) is not None]
         if width != 1 or not own:

@@ -224,11 +224,13 @@ class Drawing:
                 at = times.get(f"{group}.{part}", times[group])
                 own[f"{group}.{part}"] = self._quantity(drawn, part, at, unit, width)
         for foot in [each.name for each in self.robot.feet][: self.one_of(0, 1, 2)]:
-            at = times.get(f"contacts.{foot}", times["contacts"])
+            own_topic = f"contacts.{foot}"
+            at = times[own_topic if own_topic in times else "contacts"]
             if self.happens(0.7):
                 own[f"contacts.{foot}.force"] = self._quantity(drawn, "force", at, "N", 1)
             else:
-                flags = (np.sin(3.0 * at + self.chance.random()) > 0)[:, None]
+                switches = 1 if bag else self.one_of(1, 1, 3)
+                flags = np.sin(np.outer(at, self.chance.uniform(2.0, 4.0, switches))) > 0
                 own[f"contacts.{foot}.closed"] = Quantity(flags.astype(self.one_of(bool, np.int8, np.float64)))  # fmt: skip
         if self.happens(0.5):
             params["imu"] = {
@@ -306,10 +308,10 @@ class Drawing:
         self.chance.shuffle(places)
         drawn.flaws = dict(zip(places[: self.one_of(1, 2, 3)], kinds, strict=False))
         for place, kind in drawn.flaws.items():
-            if kind.startswith("unit") and place.endswith(
-                (".quaternion", ".closed")
-            ):  # which have none
-                drawn.flaws[place] = "column"
+            if kind.startswith("unit") and place.endswith((".quaternion", ".closed")):
+                drawn.flaws[place] = "column"  # which have none
+            if kind == "width" and place.endswith(".closed"):
+                drawn.flaws[place] = "column"  # which has any
             if kind == "text" and bag and not drawn.joints:
                 drawn.flaws[place] = "column"
         if drawn.joints and self.happens(0.3):

@@ -212,7 +212,7 @@ class Expected:
             any_foot = True
             foot, _, what = key.removeprefix("contacts.").rpartition(".")
             force = table.values[:, 0]
-            state = force != 0
+            state = (table.values != 0).any(axis=1)
             if what == "force":
                 now, state = force[0] >= -5.0, np.zeros(len(force), bool)
                 for k, each in enumerate(force):

@@ -97,14 +97,15 @@ def _recording(
     specs: dict[str, Any] = {}
     for key in drawn.quantities:
         if key in RECORDED:
-            name = f"robot.{RECORDED[key]}"
-            values = run.signal(name)
+            columns: str | list[str] = f"robot.{RECORDED[key]}"
+            values = run.signal(f"robot.{RECORDED[key]}")
         else:
-            point = robot.foot_of_contact().index(feet.index(key.split(".")[1]))
-            name = f"robot.contacts.closed[{point}]"
-            values = run.signal("robot.contacts.closed")[:, [point]]
+            foot = feet.index(key.split(".")[1])
+            points = [k for k, owner in enumerate(robot.foot_of_contact()) if owner == foot]
+            columns = [f"robot.contacts.closed[{point}]" for point in points]
+            values = run.signal("robot.contacts.closed")[:, points]
         drawn.quantities[key] = Quantity(values)
-        specs[key] = _spec(name, drawn.quantities[key])
+        specs[key] = _spec(columns, drawn.quantities[key])
     drawn.stamps = dict.fromkeys(("imu", "joints", "contacts", "truth"), drawn.played.period * np.arange(len(values)))  # fmt: skip
     return folder / "log.rrd", specs, None
 

@@ -154,8 +154,21 @@ def misalignment(
             z -= gradient[0] * x + gradient[1] * y
             xx, xy, yy = xx + x * x, xy + x * y, yy + y * y
             xz, yz = xz + x * z, yz + y * z
+    out[2] = 0.0
+    if not turn_to_level(xx, xy, yy, xz, yz, out):
+        return False
+    rotate(orientation, forward, place)
+    out[2] = -atan2(place[1], place[0])
+    return True
+
+
+@kernel
+def turn_to_level(xx: float, xy: float, yy: float, xz: float, yz: float, out: Array1D) -> bool:
+    """Compute the turn about x and y [rad] that levels points with these sums of products; see ``misalignment``.
+
+    It is written to the first two of ``out``. False: the points lie in one line.
+    """
     determinant = xx * yy - xy * xy
-    out[0] = out[1] = out[2] = 0.0
     if determinant <= 1e-4 * (xx + yy) * (xx + yy):
         extent = max((xx + yy) * (xx + yy), 1e-12)
         out[0] = -(yy * yz + xy * xz) / extent
@@ -163,8 +176,6 @@ def misalignment(
         return False
     out[0] = (xy * xz - xx * yz) / determinant
     out[1] = (yy * xz - xy * yz) / determinant
-    rotate(orientation, forward, place)
-    out[2] = -atan2(place[1], place[0])
     return True
 
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from ...mathematics.arrays import Array1D, Flags1D, Vector3
 from ...mathematics.constants import GRAVITY
 from ...mathematics.inertial_filter import (
+    StandingPoints,
     correct_tilt_from_gravity,
     misalignment,
     rotate_in_world,
+    turn_to_level,
     weigh_contacts,
 )
 from ...mathematics.kernel import kernel
@@ -56,10 +59,16 @@ _FIRST_UNREST = 0.1
 _LARGEST_UNREST = 0.3
 """The low-pass of the standing points' speed [s], and that speed [m/s] at a start in a step, and at most."""
 _SOLE_TIME = 1.0
+_RIGID_TIME = 1.0 / 3.0
 _LEAN_TIME = 2.0
 _LARGEST_LEAN = 0.1
-"""Time constants [s] of the correction of the tilt by a standing sole, and of the sole's mean tilt; and how far [rad] a
-sole may seem to tilt from its mean: one that tilts farther rolls. All after a start in a step."""
+"""Time constants [s] of the correction by a standing sole whose leg yields, by one whose leg does not, and of the sole's
+mean tilt; and how far [rad] a sole may seem to tilt from its mean: one that tilts farther rolls. All after a start in a step."""
+_FIRST_WOBBLE = 3e-4
+_OFFSET_WOBBLE = 3e-5
+_YIELD_TIME = 0.25
+"""Squared turn [rad^2] of standing soles that is expected at first, of a degree, and that offsets of encoders make: soles that
+turn by less have legs that do not yield. And the time [s] over which what a leg yields is correlated."""
 _REST_TIME = 2.0
 """Time constant [s] with which the gyroscope's bias is learnt at rest after a step."""
 
@@ -81,6 +90,7 @@ class GroundTrust(Signal):
         frame="world",
         text="turn that would lay each sole flat, low-passed",
     )
+    wobble = Field(unit="rad^2", text="squared turn of standing soles, low-passed")
     waited = Field(
         unit="s", text="time since the start without rest; infinite once the robot has rested"
     )
@@ -118,6 +128,9 @@ class StateEstimatorParameters(InertialParameters):
         ge=0.0,
         le=1.0,
         text="share of a sole's apparent tilt by which its leg is turned, after a start in a step",
+    )
+    keep_soles: bool = parameter(
+        False, text="after a start at rest, too, soles correct the attitude from the first step on"
     )
     bias_spread: float = live_parameter(
         0.01,
@@ -171,9 +184,10 @@ class StateEstimator(InertialEstimator):
 
     It starts at the first sample, or in a gantry when the first point touches the ground, with the robot standing on level ground, or ground of that ``slope``; or in a step,
     if a rate is above 0.5 rad/s, also with all points in contact: then only the points in contact are on the ground, they give the first velocity, the tilt is
-    theirs, beside their line the accelerometer's where they lie in one, and the result has a warning. From then on each sole that stands keeps its tilt: what
-    seems to change in it corrects the tilt within 1 s, and moves the leg's points by the share ``flexion``, for a leg yields
-    under its load and encoders do not see it. The world's
+    theirs, beside their line the accelerometer's where they lie in one, and the result has a warning. From then on, with ``keep_soles`` also
+    after a start at rest, each sole that stands keeps its attitude: what seems to change in its tilt moves the leg's points by the share ``flexion``, for a leg yields
+    under its load and encoders do not see it, and corrects the tilt within 1 s, or a third of it where soles hardly turn; there it
+    corrects the heading, too. What has to be corrected again and again is the gyroscope's bias. The world's
     origin is midway between the soles, and x is the heading of the feet; for feet of one contact point it is
     the heading of the pattern in which they stand. Yaw and horizontal position drift. After a jump
     the height of the ground is known only through the anchors. The block never waits and raises no
@@ -208,6 +222,7 @@ class StateEstimator(InertialEstimator):
             trust.flown = True
         if trust.gate == 0.0:  # the first tick: the feet point along x
             trust.facing = True
+            trust.wobble = _FIRST_WOBBLE
             trust.stepped = not estimate.stood
             trust.unrest = _FIRST_UNREST if trust.stepped else 0.0
             trust.gate = max(params.gate, params.unrest_factor * trust.unrest)
@@ -216,6 +231,8 @@ class StateEstimator(InertialEstimator):
         elif fastest == math.inf:  # a foot that steps points elsewhere afterwards
             trust.facing = False
             trust.stepped = True
+            if params.keep_soles and trust.age == math.inf:
+                trust.age = _LONGEST_LINE  # what the age is asked for is known by then
         trust.age += constants.period
         if trust.waited < math.inf and estimate.stood:
             watch_for_step(estimate, trust, params, constants, fastest)
@@ -235,7 +252,9 @@ class StateEstimator(InertialEstimator):
         trusted, support = trust_points(estimate, trust, legs, params, constants, scratch)
         correct_motion(estimate, legs, params, constants, scratch, trusted, support)
         if trust.stepped:
-            correct_tilt_by_velocity(estimate, trust, params, constants, scratch, support)
+            correct_attitude(estimate, trust, params, constants, scratch, support)
+            if trust.age < math.inf:
+                learn_gyro_bias(estimate, trust, params, scratch)
             if still:
                 share = constants.period / _REST_TIME
                 estimate.gyro_bias[:] += share * (estimate.mean_rate - estimate.gyro_bias)
@@ -249,7 +268,7 @@ class StateEstimator(InertialEstimator):
         return (
             (
                 "the estimate began while the robot was stepping: its tilt is known to some degrees for the first "
-                "second, and the gyroscope's bias is learnt only at rest"
+                "second, and the gyroscope's bias hardly for the first two"
             ),
         )
 
@@ -276,7 +295,7 @@ def watch_for_step(
 
 
 @kernel
-def correct_tilt_by_velocity(
+def correct_attitude(
     estimate: BaseEstimate,
     trust: GroundTrust,
     params: StateEstimatorParameters,
@@ -284,14 +303,21 @@ def correct_tilt_by_velocity(
     scratch: InertialScratch,
     support: float,
 ) -> None:
-    """Correct the tilt by what the standing points say of the velocity: a tilt error is a false acceleration."""
-    if trust.age < _SETTLING:
-        return
-    residual = scratch.residual
-    limit(residual, 0.3, residual)
-    time = min(trust.age, params.tilt_time)
-    gain = support * constants.velocity_gain / (GRAVITY * time)
-    rotate_in_world(estimate.orientation, -gain * residual[1], gain * residual[0], 0.0)
+    """Correct the attitude by the soles, if they wrote to ``error``, and the tilt by the velocity of the standing points, too.
+
+    A tilt error is a false acceleration. The soles' heading counts as far as the legs are rigid.
+    """
+    residual, error = scratch.residual, scratch.error
+    if trust.age == math.inf:
+        error[:] = 0.0
+    if trust.age >= _SETTLING:
+        limit(residual, 0.3, residual)
+        time = min(trust.age, params.tilt_time)
+        gain = support * constants.velocity_gain / (GRAVITY * time)
+        error[0] -= gain * residual[1]
+        error[1] += gain * residual[0]
+    rigid = _OFFSET_WOBBLE / (_OFFSET_WOBBLE + trust.wobble)
+    rotate_in_world(estimate.orientation, error[0], error[1], rigid * error[2])
 
 
 @kernel
@@ -358,36 +384,94 @@ def use_soles(
     constants: InertialConstants,
     scratch: InertialScratch,
 ) -> None:
-    """Correct the tilt by each sole that stands, and move its points to where they are if its leg has yielded.
+    """Write to ``error`` the turn that standing soles ask for, and move their points to where they are if their legs have yielded.
 
-    A standing sole keeps its tilt. If it seems to change, the estimate tilts, or the leg yields under its load, which encoders
-    do not see. In both cases the leg's points are turned back about the base. What does not change, as the slope
-    of the ground, is left alone.
+    A standing sole keeps its attitude. If it seems to change, the estimate turns, or the leg yields under its load, which
+    encoders do not see. In both cases the leg's points are turned back about the base. The more the soles turn, the less
+    they are believed; what does not change of the tilt of soles that turn, as the slope of the ground, is left alone.
     """
-    motion, points, owners = legs.motion, legs.points, legs.contacts.foot
-    error, place, standing, turned = scratch.error, scratch.vector, scratch.standing, scratch.middle
-    passing = constants.period / (_LEAN_TIME + constants.period)
+    points, owners = legs.points, legs.contacts.foot
+    error, turn, standing = scratch.error, scratch.vector, scratch.standing
+    error[:] = 0.0
+    rigid = _OFFSET_WOBBLE / (_OFFSET_WOBBLE + trust.wobble)
+    passing = (1.0 - rigid) * min(constants.period / _LEAN_TIME, 1.0)
     for foot in range(trust.lean.shape[0]):
         for point in range(standing.shape[0]):
             standing[point] = points.active[point] and owners[point] == foot
         if count_standing(standing) == 0:
             continue
-        misalignment(
-            estimate.orientation, motion.points, standing, motion.forward, constants.gradient, error, place
-        )  # fmt: skip
+        turn_of_sole(estimate.position, points, standing, constants.gradient, turn)
         lean = trust.lean[foot]
-        lean[0] += passing * (error[0] - lean[0])
-        lean[1] += passing * (error[1] - lean[1])
-        x, y = error[0] - lean[0], error[1] - lean[1]
+        lean[0] += passing * (turn[0] - lean[0])
+        lean[1] += passing * (turn[1] - lean[1])
+        x, y = turn[0] - lean[0], turn[1] - lean[1]
         ratio = 1.0 + (x * x + y * y) / (_LARGEST_LEAN * _LARGEST_LEAN)
-        x, y = x / (ratio * ratio), y / (ratio * ratio)
-        gain = min(constants.period / _SOLE_TIME, 1.0)
-        rotate_in_world(estimate.orientation, gain * x, gain * y, 0.0)
-        turned[:] = estimate.orientation
-        rotate_in_world(turned, params.flexion * x, params.flexion * y, 0.0)
+        part = 1.0 / (ratio * ratio)
+        x, y = part * x, part * y
+        z = max(min(turn[2], _LARGEST_LEAN), -_LARGEST_LEAN)
+        squared = x * x + y * y + z * z
+        trust.wobble += min(constants.period / _UNREST_TIME, 1.0) * (squared - trust.wobble)
+        trust.wobble = max(trust.wobble, squared)
+        rigid = _OFFSET_WOBBLE / (_OFFSET_WOBBLE + trust.wobble)
+        gain = min(constants.period * ((1.0 - rigid) / _SOLE_TIME + rigid / _RIGID_TIME), 1.0)
+        error[0] += gain * x
+        error[1] += gain * y
+        error[2] += gain * z
+        x, y = params.flexion * x, params.flexion * y
         for point in range(standing.shape[0]):
             if standing[point]:
-                rotate(turned, motion.points[point], points.places[point])
+                place = points.places[point]
+                ahead, left, up = place[0], place[1], place[2]
+                place[0] = ahead + y * up
+                place[1] = left - x * up
+                place[2] = up + x * left - y * ahead
+
+
+@kernel
+def turn_of_sole(
+    position: Vector3, points: StandingPoints, standing: Flags1D, gradient: Array1D, out: Vector3
+) -> None:
+    """Compute the rotation vector [rad, world] that lays some points on the ground, and turns them as they touched down."""
+    places, anchors = points.places, points.anchors
+    n, mx, my, mz = 0.0, 0.0, 0.0, 0.0
+    for i in range(standing.shape[0]):
+        if standing[i]:
+            n, mx, my, mz = n + 1.0, mx + places[i, 0], my + places[i, 1], mz + places[i, 2]
+    each = 1.0 / n
+    mx, my, mz = each * mx, each * my, each * mz
+    xx, xy, yy, xz, yz, across = 1e-12, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(standing.shape[0]):
+        if standing[i]:
+            x, y, z = places[i, 0] - mx, places[i, 1] - my, places[i, 2] - mz
+            z -= gradient[0] * x + gradient[1] * y
+            xx, xy, yy, xz, yz = xx + x * x, xy + x * y, yy + y * y, xz + x * z, yz + y * z
+            if points.anchored[i]:
+                u, v = position[0] + places[i, 0], position[1] + places[i, 1]
+                across += x * (anchors[i, 1] - v) - y * (anchors[i, 0] - u)
+    turn_to_level(xx, xy, yy, xz, yz, out)
+    out[2] = across / (xx + yy)
+
+
+@kernel
+def learn_gyro_bias(
+    estimate: BaseEstimate,
+    trust: GroundTrust,
+    params: StateEstimatorParameters,
+    scratch: InertialScratch,
+) -> None:
+    """Learn the gyroscope's bias after a start in a step, by the turn in ``error`` that soles and velocity ask for in a tick.
+
+    The gain is that of a line by least squares over the time since the start, weighed against ``bias_spread`` by what the
+    soles turn.
+    """
+    body = scratch.vector
+    time = min(max(trust.age, _SHORTEST_LINE), _LONGEST_LINE)
+    variance = params.bias_spread * params.bias_spread
+    noise = 12.0 * _YIELD_TIME * trust.wobble
+    gain = 6.0 * _SOLE_TIME * variance * time / (variance * (time * time * time) + noise)
+    rotate_back(estimate.orientation, scratch.error, body)
+    estimate.gyro_bias[:] -= gain * body
+    limit(estimate.gyro_bias, 3.0 * params.bias_spread, estimate.gyro_bias)
 
 
 @kernel

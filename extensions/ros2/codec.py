@@ -448,13 +448,13 @@ class Codec:
             if leaf.parts == "xyzw":
                 value[3] = 1.0
             return value
-        value = getattr(owner, name)
+        told = getattr(owner, name)
         if leaf.parts:
-            value = [getattr(value, part) for part in leaf.parts]
-        if leaf.parts == "xyzw":
-            return unit_quaternions(np.asarray(value, leaf.dtype), ".".join(leaf.path))
-        numbers: NDArray[Any] = np.asarray(value, leaf.dtype)
-        return numbers & 0xFF if leaf.base in _OCTETS else numbers
+            told = [getattr(told, part) for part in leaf.parts]
+        found: NDArray[Any] = np.asarray(told, leaf.dtype)
+        if leaf.base in _OCTETS:
+            found &= 0xFF
+        return unit_quaternions(found, ".".join(leaf.path)) if leaf.parts == "xyzw" else found
 
     def _rank(self, message: Any) -> NDArray[np.int64] | None:
         """Return the places in the message's lists of the names in ``order``."""

@@ -58,7 +58,8 @@ class LogContact(Parameters):
     closes: float = parameter(20.0, unit="N", text="force above which the switches close")
     opens: float = parameter(10.0, unit="N", text="force below which they open")
     closed: Columns | None = parameter(
-        None, text="in place of a force: a column that is not zero in contact"
+        None,
+        text="in place of a force: columns of its switches, one of which is not zero in contact",
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 from typing import Any
@@ -296,13 +296,13 @@ def _contacts(player: _Player) -> tuple[dict[int, Series], dict[int, Series]]:
                 )
             )
         columns = given.closed if given.force is None else given.force
-        units: Mapping[int, Sequence[str]] = {1: [""]}
+        units: Units = ""
         if given.force is not None:
             told = isinstance(columns, LogColumns) and columns.unit is not None  # of all six alike
             units = {1: ["N"], 6: ["N"] * 6 if told else ["N"] * 3 + ["N m"] * 3}
         series = player.take(columns, units, f"contacts.{name}")
         if series is not None and name in feet:
-            flags = series.values[:, 0] != 0.0
+            flags = (series.values != 0.0).any(axis=1)
             if given.force is not None:
                 forces[feet.index(name)] = series
                 normal = series.values[:, 2 if series.values.shape[1] == 6 else 0]

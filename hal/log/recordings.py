@@ -12,6 +12,8 @@ def read_recording(path: Path) -> LogFile:
     """Read the numbers of every signal."""
     run = read(path)
     log = LogFile(path)
+    if run.header.robot is not None:
+        log.texts["joints of the run"] = [joint.name for joint in run.header.robot.joints]
     for name, signal in run.signals().items():
         values = run[name]
         if len(values) < 2 or not values.size:

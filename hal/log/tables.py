@@ -246,7 +246,7 @@ class _Column:
         found = _values(part, before)
         if found is None:  # nothing is known of it, but that it is missing
             if self.kind:
-                self._grow(_missing(self.values, len(part)))
+                self._grow(self._missing(self.values, len(part)))
             return
         truths, moments = kinds.is_boolean(part.type), kinds.is_temporal(part.type)
         kind = "truths" if truths else "moments" if moments else "numbers"
@@ -257,7 +257,7 @@ class _Column:
             raise _NoNumbersError(f"has {self.kind} first, and {kind} from row {before} on")
         if not self.kind:
             self.kind = kind
-            self.values = _missing(found, before) if before else found[:0].copy()
+            self.values = self._missing(found, before) if before else found[:0].copy()
         self._grow(found)
 
     def _grow(self, found: Array) -> None:
@@ -268,13 +268,13 @@ class _Column:
         self.values.resize((rows + len(found), *found.shape[1:]), refcheck=False)
         self.values[rows:] = found
 
-
-def _missing(like: Array, rows: int) -> Array:
-    """Return rows that are missing in a column."""
-    shape = (rows, *like.shape[1:])
-    if like.dtype.kind in "Mm":
-        return np.full(shape, "NaT", like.dtype)
-    return np.full(shape, np.nan)
+    @staticmethod
+    def _missing(like: Array, rows: int) -> Array:
+        """Return rows that are missing in a column."""
+        shape = (rows, *like.shape[1:])
+        if like.dtype.kind in "Mm":
+            return np.full(shape, "NaT", like.dtype)
+        return np.full(shape, np.nan)
 
 
 def _values(column: Any, before: int) -> Array | None:

@@ -25,10 +25,10 @@ from .icub_estimators import ESTIMATORS
 ROBOTS = ("g1", "talos", "bruce")
 YIELDING = ("nothing", "hips", "ankles", "soles")
 RATES = (100, 500, 2000)
-STARTS = (1.0, 1.13, 1.26, 1.39, 1.52, 1.65, 1.78, 1.91)
+STARTS = (1.07, 1.33, 1.59, 1.85)
 """Times in the walk [s]: over two steps."""
-SEED = 2
-"""Of walks on which nothing was tuned; those of seed 1 were looked at."""
+SEEDS = (4, 5)
+"""Of walks that nothing saw; on those of seeds 1 and 3 the estimator was changed, and seed 2 showed the cause."""
 _GRID, _STEPS, _STEP_TIME, _DOUBLE = 500, 8, 0.6, 0.12
 """Samples a second, steps, and the times of a step and of its double support [s]."""
 _ANGLE = math.radians(1.0)
@@ -246,11 +246,16 @@ def rows() -> Iterator[str]:
     with tempfile.TemporaryDirectory() as folder:
         for name in ROBOTS:
             for yielding in YIELDING:
-                file = Path(folder) / f"{name}_{yielding}.npz"
-                write_walk(file, name, yielding, SEED)
+                files = [Path(folder) / f"{name}_{yielding}_{seed}.npz" for seed in SEEDS]
+                for file, seed in zip(files, SEEDS, strict=True):
+                    write_walk(file, name, yielding, seed)
                 cells = []
                 for _, estimator, settings in variants:
-                    errors = [errors_of(file, name, rate, estimator, settings) for rate in RATES]
-                    means = (math.exp(np.log(each).mean()) for each in errors)
+                    means = []
+                    for rate in RATES:
+                        errors = [
+                            errors_of(file, name, rate, estimator, settings) for file in files
+                        ]
+                        means.append(math.exp(np.log(errors).mean()))
                     cells.append(" / ".join(f"{mean:.1f}" for mean in means))
                 yield f"| {name} | {yielding} | {' | '.join(cells)} |"

@@ -70,7 +70,6 @@ class RuntimeBlock(PortOwner):
         """The parameters that kernels read, in the arrays in which they read them."""
 
     @classmethod
-    @cache
     def is_moore(cls) -> bool:
         """Return whether outputs follow from state alone (``emit`` and ``update``).
 
@@ -78,15 +77,21 @@ class RuntimeBlock(PortOwner):
             DeclarationError: the class defines neither ``step`` nor ``emit`` and ``update``, or
                 methods of both kinds.
         """
-        step, emit, update = hasattr(cls, "step"), hasattr(cls, "emit"), hasattr(cls, "update")
-        if step and not emit and not update:
-            return False
-        if emit and update and not step:
-            return True
-        raise DeclarationError(
-            f"{cls.__name__} must define either step(), or emit() and update(); it defines "
-            + (", ".join(n for n in ("step", "emit", "update") if hasattr(cls, n)) or "none")
-        )
+        return _is_moore(cls)  # type: ignore[arg-type]  # a class is hashable; mypy asks its instances
+
+
+@cache
+def _is_moore(block_type: type[RuntimeBlock]) -> bool:
+    """Return what ``is_moore`` does; a load asks three times for each block."""
+    step, emit, update = (hasattr(block_type, name) for name in ("step", "emit", "update"))
+    if step and not emit and not update:
+        return False
+    if emit and update and not step:
+        return True
+    raise DeclarationError(
+        f"{block_type.__name__} must define either step(), or emit() and update(); it defines "
+        + (", ".join(n for n in ("step", "emit", "update") if hasattr(block_type, n)) or "none")
+    )
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,8 @@ import yaml
 
 from aloft import load
 from aloft.cli.log_import import guess, import_log, of_axes
+from aloft.cli.logged_joints import columns_of_joints
+from aloft.logs.recording.recorder import Recorder
 from aloft.robots.description import find_robot
 
 START, STEP, ROWS = 1_700_000_000, 0.005, 60
@@ -170,3 +172,36 @@ def test_only_arrival_times_of_all_rows_get_an_even_grid(
     import_log(tmp_path / "log.csv", None, tmp_path / "graph.yaml")
     clock = yaml.safe_load((tmp_path / "graph.yaml").read_text())["blocks"]["robot"]["with"]["clock"]  # fmt: skip
     assert clock.get("even", False) == even
+
+
+def test_what_was_measured_comes_before_what_was_computed_or_known() -> None:
+    widths = {
+        "estimator.base.angular_velocity": 3, "ahead.joints.position": 10, "robot.truth.joint_position": 10,
+        "dynamics.terms.base_position": 3, "robot.imu.angular_velocity": 3, "robot.imu.specific_force": 3,
+        "plan.reference.joint_torque": 10, "robot.joints.position": 10, "robot.joints.torque": 10,
+        "robot.truth.base_position": 3, "dynamics.terms.base_orientation": 4, "robot.truth.base_orientation": 4,
+    }  # fmt: skip
+    assert guess(widths, joints=[10]) == {
+        "angular_velocity": "robot.imu.angular_velocity", "specific_force": "robot.imu.specific_force",
+        "joint_position": "robot.joints.position", "joint_torque": "robot.joints.torque",
+        "truth_position": "robot.truth.base_position", "truth_quaternion": "robot.truth.base_orientation",
+    }  # fmt: skip
+    single = {f"{name}[{joint}]": 1 for name in ("ahead.position", "robot.position") for joint in JOINTS}  # fmt: skip
+    found = columns_of_joints(single, find_robot("bruce"), "robot.imu.specific_force[x]")
+    assert found["position"] == [f"robot.position[{joint}]" for joint in JOINTS]
+
+
+@pytest.mark.long
+def test_a_recording_of_aloft_is_imported_whole(tmp_path: Path) -> None:
+    load("aloft:jump.yaml").run(sinks=[Recorder(tmp_path / "jump.rrd")], log=False, run_hash=False)
+    graph = tmp_path / "graph.yaml"
+    import_log(tmp_path / "jump.rrd", Path("bruce"), graph, as_json=True)
+    played = yaml.safe_load(graph.read_text())["blocks"]["robot"]["with"]
+    closed = {foot: given["closed"] for foot, given in played["contacts"].items()}
+    assert sorted(closed["left_foot"] + closed["right_foot"]) == [
+        f"robot.contacts.closed[{k}]" for k in range(4)
+    ]
+    result = load(graph).run()
+    assert result.metrics["estimator_flights"] == 1
+    assert float(result.metrics["estimator_position_rms_m"]) < 0.01
+    assert not result.block_warnings

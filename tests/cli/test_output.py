@@ -40,6 +40,12 @@ TABLES = [
 ]
 
 
+@pytest.fixture(autouse=True)
+def _nobody_asks_for_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("FORCE_COLOR", "TTY_COMPATIBLE"):
+        monkeypatch.delenv(name, raising=False)
+
+
 @pytest.mark.parametrize(("title", "columns", "rows"), TABLES)
 def test_a_table_in_a_pipe_is_rich_s_own(
     title: str, columns: tuple[str, ...], rows: list[tuple[str, ...]], capsys: Any

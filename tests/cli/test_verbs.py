@@ -281,7 +281,11 @@ atexit.register(lambda: print(len(searched), gc.get_freeze_count(), *sys.modules
     }  # fmt: skip
 
 
-def test_an_unrecorded_run_imports_no_recorder(start: Start) -> None:
+def test_an_unrecorded_run_imports_no_recorder(
+    start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("FORCE_COLOR", "TTY_COMPATIBLE"):  # by which Rich takes a pipe for a terminal
+        monkeypatch.delenv(name, raising=False)
     # Nor links between processes, nor what checks a plan that has passed or makes a table that is kept.
     graph, before = (
         str(ROOT / "graphs" / "jump.yaml"),

@@ -1,5 +1,6 @@
 """JumpPlan: the shipped plans without a solver, inline tasks, and refusals that say why."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -89,9 +90,7 @@ def test_a_kept_plan_that_is_not_valid_never_starts(tmp_path: Path) -> None:
     task = read_task(SHIPPED.parent / "tasks" / "in_situ.yaml")
     plan = PlanLibrary(robot, Path("nowhere")).find(task)
     assert plan is not None
-    PlanLibrary(robot, tmp_path).add(
-        type(plan)(**{**vars(plan), "joint_torque": 2.0 * plan.joint_torque})
-    )
+    PlanLibrary(robot, tmp_path).add(replace(plan, joint_torque=2.0 * plan.joint_torque))
     with pytest.raises(AloftError, match="is not valid:\njoint_torque"):
         bench(task="tasks/in_situ.yaml", library=str(tmp_path))
 

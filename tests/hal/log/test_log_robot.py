@@ -291,6 +291,10 @@ def test_the_default_estimator_follows_a_real_robot_at_any_rate(tmp_path, rate, 
     metrics = icub_estimators.metrics_of(robot, log, rate, "StateEstimator")
     assert metrics["estimator_position_rms_m"] < WORST[name]
     assert metrics["log_repeated_imu_share"] > 0.04
+    kept = icub_estimators.metrics_of(
+        robot, log, rate, "StateEstimator", settings=icub_estimators.KEPT
+    )
+    assert kept["estimator_position_rms_m"] < {"walk": 0.012, "sway": 0.003}[name]
 
 
 @needs_icub

@@ -277,3 +277,10 @@ def test_a_foot_that_the_robot_lacks_has_its_columns_looked_at_too():
     text = said(log_of(), contacts={"left_fot": {"force": "odd"}})
     assert "contacts: bruce has no foot left_fot | left_fot | left_foot" in text
     assert "contacts.left_fot: log.npz has no column 'odd'" in text
+
+
+def test_a_foot_is_in_contact_where_one_of_its_switches_is():
+    flags = np.stack([TIMES > 0.5, TIMES < 0.2], axis=1)
+    rows = played(log_of(heel_toe=flags), contacts={"left_foot": {"closed": "heel_toe"}}).rows
+    own = np.array(find_robot("bruce").foot_of_contact()) == [f.name for f in find_robot("bruce").feet].index("left_foot")  # fmt: skip
+    assert np.array_equal(rows.closed[:, own].all(axis=1), flags.any(axis=1))
