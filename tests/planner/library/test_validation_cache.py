@@ -81,7 +81,8 @@ def test_a_later_process_finds_the_very_table(task, monkeypatch):
     monkeypatch.setattr(validation_cache, "_tables", validation_cache.ResultCache())
     validation_cache.cached_reference_table(plan, ROBOT, 0.2)
     monkeypatch.setattr(validation_cache, "_tables", validation_cache.ResultCache())
-    monkeypatch.setattr(validation_cache, "reference_table", None)  # not needed any more
+    making = "aloft.planner.library.reference_table.reference_table"
+    monkeypatch.setattr(making, None)  # not needed any more
     found = validation_cache.cached_reference_table(plan, ROBOT, 0.2)
     assert {**vars(found), "time": 0, "columns": 0, "contact": 0} == {
         **vars(made), "time": 0, "columns": 0, "contact": 0,
