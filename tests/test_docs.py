@@ -269,6 +269,13 @@ def anchors(page: Path) -> set[str]:
     return {heading.replace(" ", "-") for heading in plain}
 
 
+def test_the_readme_shows_first_how_to_jump_and_to_test() -> None:
+    first = (ROOT / "README.md").read_text().split("```sh\n")[1].split("```")[0].splitlines()
+    targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)
+    shown = [line.split()[1] for line in first if line.startswith("make ")]
+    assert shown == ["jump", "test"] and set(shown) <= set(targets)
+
+
 def test_the_readme_shows_files_that_are_there() -> None:
     text = (ROOT / "README.md").read_text()
     for path in re.findall(r"`([\w/]+\.(?:py|yaml|md))`", text):
