@@ -8,10 +8,10 @@ division by zero to Python.
 from __future__ import annotations
 
 import ctypes
+from collections import namedtuple
 from dataclasses import dataclass
 from functools import cache
-from operator import itemgetter
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,18 +70,9 @@ class RecordType:
 def record_type(name: str, fields: tuple[str, ...]) -> type:
     """Make the named tuple of some fields of a signal or of parameters: one class for each
     choice."""
-    # A start makes a hundred and more; ``namedtuple`` takes six times as long, as it compiles each a ``__new__``.
-    parts = {field: property(itemgetter(place)) for place, field in enumerate(fields)}
-    return type(
-        name, (_Record,), {"__slots__": (), "__module__": __name__, "_fields": fields, **parts}
-    )
-
-
-class _Record(tuple[Any, ...]):
-    __slots__ = ()
-
-    def __new__(cls, *parts: Any) -> Self:
-        return super().__new__(cls, parts)
+    made = namedtuple(name, fields)  # type: ignore[misc]  # the names are known only now
+    made.__module__ = __name__
+    return made
 
 
 def _same_record(name: str, fields: tuple[str, ...], parts: tuple[ArgumentType, ...]) -> RecordType:

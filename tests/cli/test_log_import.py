@@ -139,7 +139,9 @@ def test_soles_need_not_be_level_as_the_description_stands(tmp_path: Path, feet:
         written = re.sub(r"points: \[\[.*\]\]", "radius: 0.02", written)
         assert "points" not in written
     rolled = "r_hip_roll: 0.368, r_hip_yaw: 0.351, r_hip_pitch: 0.723, r_knee: -1.31, r_ankle_roll: -0.097"
-    robot.write_text(f"{written}\nstanding: {{{rolled}}}\n")
+    written, count = re.subn(r"(?m)^standing: .*$", f"standing: {{{rolled}}}", written)
+    assert count == 1
+    robot.write_text(written)
     said, played = imported(FOLDER / "icub" / "walking.mat", robot, tmp_path / "walk.yaml")
     assert any("the feet stand still with these names" in note for note in said["notes"])
     assert played["imu"]["sensor"] == "root_link_imu_acc"
